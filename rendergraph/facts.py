@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Literal, Protocol
+from typing import Any, Literal
 
 from msgspec import Struct, field
 from msgspec.structs import astuple
@@ -31,24 +31,13 @@ class LightFacts(Struct, frozen=True):
     casts_shadow: bool = True
 
 
-class _Light(Protocol):
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def type(self) -> str: ...
-
-    @property
-    def casts_shadow(self) -> bool: ...
-
-
-def casting_lights(wanted: str | Sequence[str], lights: Sequence[_Light]) -> tuple[int, ...]:
+def casting_lights(wanted: str | Sequence[str], lights: Sequence[Any]) -> tuple[int, ...]:
     """Return the shadow-casting lights, as indices into the scene's lights, in its order.
 
     Args:
         wanted: `auto` for the first directional, else the first spot, else the first point light, and `all`, both of
             those that cast shadows; or a light's name, or several.
-        lights: the scene's lights.
+        lights: the scene's lights, each with `name`, `type` and `casts_shadow`.
 
     Raises:
         SceneError: no light has that name.

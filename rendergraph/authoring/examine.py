@@ -23,7 +23,7 @@ from rendergraph.catalog.types import shared_includes
 from rendergraph.declare import Function, Input, Node, Views, WrittenPort
 from rendergraph.declare.blame import declaration_of
 from rendergraph.errors import InputError, Problem, shown_file
-from rendergraph.glsl import expand, read_text, strip_comments
+from rendergraph.glsl import Includes, read_text, strip_comments
 
 LONGEST_DOC = 160
 OnStage = Callable[[str, str], None]
@@ -138,7 +138,8 @@ def _unused(node: NodeType, active: Collection[str], files: Iterable[Path]) -> I
 def _shader_text(file: Path, inherited: tuple[Path, ...]) -> str:
     if not file.is_file():
         return ""
-    origins = expand(file, shared_includes(), root=file.parent, versions=True, inherited=inherited).origins
+    includes = Includes(shared_includes())
+    origins = includes.expand(file, root=file.parent, versions=True, inherited=inherited).origins
     files = dict.fromkeys(origin.file for origin in origins if origin.file is not None)
     return "\n".join(strip_comments(read_text(one)) for one in files)  # `#include <CURVE>` with them
 

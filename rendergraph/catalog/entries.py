@@ -149,8 +149,6 @@ class Entries:
         depth = [name for name, entry in self.header.outputs.items() if _is_depth(entry)]
         return [*(located[number] for number in sorted(located)), *depth]
 
-    # Inputs ----------------------------------------------------------------------------------------------------------
-
     def _input(self, name: str, entry: Mapping[str, Value]) -> None:
         many = bool("many" in entry and entry["many"].data)
         found = self.declared.get(name)
@@ -218,8 +216,6 @@ class Entries:
         where = value if value is not None else next(iter(entry.values()))
         self.problems.append(where.problem("RG440", text))
         return AnyTexture
-
-    # Outputs ---------------------------------------------------------------------------------------------------------
 
     def _output(self, name: str, entry: Mapping[str, Value]) -> None:
         original = {new: old for old, new in self._renamed.items()}.get(name, name)
@@ -294,8 +290,6 @@ class Entries:
         self.problems.append(entry["format"].problem("RG444", text))
         return False
 
-    # Parameters ------------------------------------------------------------------------------------------------------
-
     def _parameter(self, name: str, entry: Mapping[str, Value]) -> None:
         declared = self.declared.get(name)
 
@@ -317,8 +311,6 @@ class Entries:
     def _words(self) -> frozenset[str]:
         """Words of the text, its includes, and of what is included by a parameter, as in `#include <CURVE>`."""
         return frozenset(re.findall(r"[A-Za-z_]\w*", "\n".join((*self.source.lines, strip_comments(self.raw)))))
-
-    # What the header refers to ---------------------------------------------------------------------------------------
 
     def _check_references(self) -> None:
         """`like`, `size` and `$name` must name inputs and structural parameters."""

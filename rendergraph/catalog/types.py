@@ -82,7 +82,7 @@ class NodeType(Struct, frozen=True, dict=True):
     @property
     def word(self) -> str:
         """A node id for the type, whose own name may be a path."""
-        return node_word(self.name)
+        return re.sub(r"[^A-Za-z0-9_-]", "_", PurePath(self.name).stem)
 
 
 def shared_includes() -> Path:
@@ -92,11 +92,6 @@ def shared_includes() -> Path:
 def _is_there(file: Path) -> bool:
     record_read(file)
     return file.is_file()
-
-
-def node_word(name: str) -> str:
-    """A type's name as a node's id."""
-    return re.sub(r"[^A-Za-z0-9_-]", "_", PurePath(name).stem)
 
 
 class Listed(Struct, frozen=True):

@@ -189,8 +189,6 @@ class GpuScene(Struct, eq=False, dict=True):
             self._constants[name] = self.device.ctx.buffer(values.tobytes())
         return self._constants[name], f"{SCENE_ATTRIBUTES[name]}/i"
 
-    # Images ---------------------------------------------------------------------------------------------------------
-
     def texture(self, texture: Texture) -> tuple[int, int]:
         """GL names of a material texture and its sampler."""
         image = self._images[texture.image, texture.srgb].glo

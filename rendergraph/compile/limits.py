@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from rendergraph.allocate import ResourcePlan
 from rendergraph.errors import InputError, Problem, RenderError
@@ -15,33 +15,14 @@ from rendergraph.textures import FORMATS, TextureDesc
 
 def check_plan(device: Device, plan: ResourcePlan, views: Mapping[str, ViewTable], fixed_blocks: int) -> None:
     """Refuse what this device cannot hold, all of it at once."""
-    limits = device.limits
-    _check_samples(plan, limits)
-    texts = [text for name, resource in plan.resources.items() for text in _texture(name, resource.desc, limits)]
-    most = limits["uniform_block"] // VIEW.itemsize
-    for name, table in views.items():
-        if table.count > most:
-            texts.append(f"view table '{name}' has {table.count} views; a uniform block of this device holds {most}")
-    bindings = limits["uniform_bindings"]
-    if fixed_blocks + len(views) > bindings:
-        texts.append(f"there are {len(views)} view tables; this device binds {bindings - fixed_blocks} at once")
-    problems = [Problem("RG435", text) for text in texts]
-    problems += [problem for step in plan.schedule.steps for problem in _step(step, limits, fixed_blocks)]
-    if not device.has_depth_bounds:
-        problems += [
-            step.problem(
-                "RG435", "its `State` has depth bounds, which this device lacks; `rendergraph doctor` says more"
-            )
-            for step in plan.schedule.steps
-            if step.state.depth_bounds is not None
-        ]
-    if problems:
+    if mistakes := list(dict.fromkeys(_samples(plan, device.limits))):
+        raise InputError(mistakes)
+    if problems := list(_excesses(device, plan, views, fixed_blocks)):
         raise RenderError(problems)
 
 
-def _check_samples(plan: ResourcePlan, limits: Mapping[str, int]) -> None:
+def _samples(plan: ResourcePlan, limits: Mapping[str, int]) -> Iterator[Problem]:
     """Unlike the other limits it is met by what people type: a parameter, at the node that has it."""
-    problems = []
     for step in plan.schedule.steps:
         for write in step.writes:
             desc = plan.resources[write.resource].desc
@@ -52,36 +33,43 @@ def _check_samples(plan: ResourcePlan, limits: Mapping[str, int]) -> None:
             most = limits[f"{kind}samples"]
             if desc.samples > most:
                 text = f"'{write.resource}' has {desc.samples} samples a texel, which is more than this device's {most}"
-                problems.append(Problem("RG435", text, step.where.place))
-    if problems:
-        raise InputError(list(dict.fromkeys(problems)))
+                yield Problem("RG435", text, step.where.place)
 
 
-def _texture(name: str, desc: object, limits: Mapping[str, int]) -> list[str]:
-    if not isinstance(desc, TextureDesc):
-        return []
-    found = []
-    for words, value, most in (
-        (f"is {desc.width}×{desc.height}", max(desc.size), limits["texture_size"]),
-        (f"has {desc.layers} layers", desc.layers, limits["layers"]),
-    ):
-        if value > most:
-            found.append(f"'{name}' {words}, which is more than this device's {most}")
-    return found
-
-
-def _step(step: Step, limits: Mapping[str, int], fixed_blocks: int) -> list[Problem]:
-    uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
-    buffers = {use.name for use in (*step.all_reads, *uses) if use.use == "buffer"}
-    found = []
-    for words, value, most in (
-        ("colour targets", sum(write.use == "color" for write in step.writes), limits["color_targets"]),
-        ("buffers", len(buffers), limits["storage_bindings"] - fixed_blocks),
-        ("images", sum(use.use == "image" for use in uses) if step.kind == "compute" else 0, limits["images"]),
-    ):
-        if value > most:
-            found.append(step.problem("RG435", f"it has {value} {words}; this device takes {most}"))
-    return found
+def _excesses(
+    device: Device, plan: ResourcePlan, views: Mapping[str, ViewTable], fixed_blocks: int
+) -> Iterator[Problem]:
+    limits = device.limits
+    for name, resource in plan.resources.items():
+        if isinstance(desc := resource.desc, TextureDesc):
+            for words, value, limit in (
+                (f"is {desc.width}×{desc.height}", max(desc.size), "texture_size"),
+                (f"has {desc.layers} layers", desc.layers, "layers"),
+            ):
+                if value > limits[limit]:
+                    yield Problem("RG435", f"'{name}' {words}, which is more than this device's {limits[limit]}")
+    most = limits["uniform_block"] // VIEW.itemsize
+    for name, table in views.items():
+        if table.count > most:
+            text = f"view table '{name}' has {table.count} views; a uniform block of this device holds {most}"
+            yield Problem("RG435", text)
+    bindings = limits["uniform_bindings"] - fixed_blocks
+    if len(views) > bindings:
+        yield Problem("RG435", f"there are {len(views)} view tables; this device binds {bindings} at once")
+    for step in plan.schedule.steps:
+        uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
+        buffers = {use.name for use in (*step.all_reads, *uses) if use.use == "buffer"}
+        images = sum(use.use == "image" for use in uses) if step.kind == "compute" else 0
+        for words, value, most in (
+            ("colour targets", sum(write.use == "color" for write in step.writes), limits["color_targets"]),
+            ("buffers", len(buffers), limits["storage_bindings"] - fixed_blocks),
+            ("images", images, limits["images"]),
+        ):
+            if value > most:
+                yield step.problem("RG435", f"it has {value} {words}; this device takes {most}")
+        if step.state.depth_bounds is not None and not device.has_depth_bounds:
+            text = "its `State` has depth bounds, which this device lacks; `rendergraph doctor` says more"
+            yield step.problem("RG435", text)
 
 
 def groups_of(step: Step, local: tuple[int, int, int], limits: Mapping[str, int]) -> tuple[int, int, int]:

@@ -163,8 +163,6 @@ class Memory(Struct, eq=False, dict=True):
         """2 where any texture has a history, else 1."""
         return 2 if any(len(places) == 2 for places in self.plan.placement.values()) else 1
 
-    # Looking up ------------------------------------------------------------------------------------------------------
-
     def texture(self, resource: str, parity: int = 0, *, previous: bool = False) -> GpuTexture:
         """A resource's texture in its own format."""
         base = self.physicals[self._place(resource, parity, previous)]
@@ -207,8 +205,6 @@ class Memory(Struct, eq=False, dict=True):
         if key not in self._views:
             self._views[key] = textures.view(self.device, texture, format=format, mip=mip, layer=layer)
         return self._views[key]
-
-    # Framebuffers ----------------------------------------------------------------------------------------------------
 
     def framebuffer(
         self,
@@ -297,8 +293,6 @@ class Memory(Struct, eq=False, dict=True):
             ctx = self.device.ctx
             self._dummies[key] = ctx.depth_renderbuffer((1, 1)) if depth else ctx.renderbuffer((1, 1))
         return self._dummies[key]
-
-    # The end ---------------------------------------------------------------------------------------------------------
 
     def release(self) -> None:
         self.device.unbind()

@@ -121,8 +121,6 @@ class _Compiler(Struct, eq=False, dict=True):
         made.renew()
         return made
 
-    # One step -------------------------------------------------------------------------------------------------------
-
     def _step(self, step: Step, position: int, parity: int) -> CompiledStep:
         compiled = CompiledStep(step)
         drawing = {
@@ -253,8 +251,6 @@ class _Compiler(Struct, eq=False, dict=True):
 
     def _transfer(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         compiled.before += transfer_calls(self.device, self.memory, step, parity)
-
-    # Parts ----------------------------------------------------------------------------------------------------------
 
     def _program(
         self, step: Step, parity: int, defines: Mapping[str, str], *, materials: Collection[str] = ()

@@ -211,7 +211,7 @@ class Extensions:
 
     def image_loader(self, ending: str) -> Added[ImageLoader] | None:
         """The decoder of image files of an ending."""
-        return _one("image loader", ending.lower(), self.images())
+        return _one("image loader", ending.lower(), self._added("images"))
 
     def semantics(self) -> list[Added[Semantic]]:
         """Plugins' meanings; equal ones of several plugins are listed once."""
@@ -229,10 +229,6 @@ class Extensions:
     def meshes(self) -> list[Added[MeshLoader]]:
         """Loaders of mesh files, by ending."""
         return self._added("meshes")
-
-    def images(self) -> list[Added[ImageLoader]]:
-        """Loaders of image files, by ending."""
-        return self._added("images")
 
     def metrics(self) -> list[Added[Metric]]:
         """Metrics of pictures, by name; two plugins with one name are an error."""

@@ -305,8 +305,6 @@ class _VersionAssignment:
             if view is not None and resource.view is None:
                 self.resources[write.resource] = replace(resource, view=view)
 
-    # Functions ------------------------------------------------------------------------------------------------------
-
     def _function(self, end: Endpoint) -> list[FunctionBinding]:
         recording = self.recordings.get(end.node)
         if recording is None:

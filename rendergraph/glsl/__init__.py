@@ -12,4 +12,3 @@ from rendergraph.glsl.source import MAX_DEPTH as MAX_DEPTH
 from rendergraph.glsl.source import Includes as Includes
 from rendergraph.glsl.source import Origin as Origin
 from rendergraph.glsl.source import SourceText as SourceText
-from rendergraph.glsl.source import expand as expand

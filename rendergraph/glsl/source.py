@@ -261,17 +261,6 @@ class Includes:
         raise _error("RG401", f"there is no include '{name}' {where}{suggestion(name, known)}", origin, raw)
 
 
-def expand(
-    source: Path,
-    include_folder: Path,
-    *,
-    root: Path | None = None,
-    versions: bool = False,
-    inherited: tuple[Path, ...] = (),
-) -> SourceText:
-    return Includes(include_folder).expand(source, root=root, versions=versions, inherited=inherited)
-
-
 @cache
 def _old_names(include_folder: Path) -> dict[str, str]:
     """Return old names of `<files>`, `functions()`, `.members` and other words of the shared includes, with the new."""

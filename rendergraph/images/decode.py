@@ -97,16 +97,12 @@ def _opened(source: ImageSource, limits: SceneLimits) -> Iterator[ImageFile]:
 
 
 def _error(source: ImageSource, code: str, text: str) -> InputError:
-    return InputError(Problem(code, text, Place(_name_of(source))))
-
-
-def _name_of(source: ImageSource) -> str:
-    return source.label or str(source.path)
+    return InputError(Problem(code, text, Place(source.label or str(source.path))))
 
 
 def _warn(warn: Warn | None, code: str, text: str, source: ImageSource) -> None:
     if warn:
-        warn(Problem(code, text, Place(_name_of(source)), severity="warning"))
+        warn(_error(source, code, text).problems[0].as_warning())
 
 
 def _counted(count: int) -> str:

@@ -36,8 +36,6 @@ class Checker(Struct, eq=False):
                 self._sizes(draft)
         return self.problems
 
-    # One link ---------------------------------------------------------------------------------------------------------
-
     def _link(self, draft: UnlinkedNode, port: Input | InOut, link: Link) -> None:
         info = self.textures.get(link.source.now)
         if info is None:
@@ -159,8 +157,6 @@ class Checker(Struct, eq=False):
     def _at(self, link: Link) -> str:
         return f" ({line_of(self.nodes[link.source.node].spec.place, link.value.place)})"
 
-    # The passes -------------------------------------------------------------------------------------------------------
-
     def _sizes(self, draft: UnlinkedNode) -> None:
         """Check inputs of size `same` against the node's targets."""
         made: dict[tuple[int, int], str] = {}
@@ -188,8 +184,6 @@ class Checker(Struct, eq=False):
                 takes = f"takes the size of '{draft.spec.id}.{target}', {_size(size)}"
                 carries = f"is {_size(info.desc.size)}"
                 self._report(draft, taken, link, "RG216", takes, carries, self._resizing(info))
-
-    # Ways out ---------------------------------------------------------------------------------------------------------
 
     def _converters(self, accepts: Accepts | None) -> str:
         """Suggest node types that convert; only here are types imported that the file does not use."""

@@ -343,8 +343,6 @@ class TextureInference:
         assert isinstance(table, Views)
         return self._size(end, table, None)
 
-    # Views and lights -------------------------------------------------------------------------------------------------
-
     def _view_lights(self, end: Endpoint, port: Views) -> tuple[int, ...]:
         return tuple(self._checked_value(end, "lights", port.lights, _LIGHTS)) if port.lights else ()
 

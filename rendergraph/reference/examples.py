@@ -13,7 +13,6 @@ from functools import cache
 from typing import Any
 
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.catalog.types import node_word
 from rendergraph.declare import Function, InOut, Input, LightFacts, Port
 from rendergraph.document import parse
 from rendergraph.errors import InputError
@@ -40,7 +39,7 @@ def example_text(node_type: NodeType, catalog: Catalog) -> str:
         if not port.optional:
             links[group or name] = "NODE" if group else f"NODE.{name}"
     inputs = f", inputs: {_flow(links)}" if links else ""
-    return f"{node_word(node_type.name)}: {{type: {node_type.name}{inputs}}}"
+    return f"{node_type.word}: {{type: {node_type.name}{inputs}}}"
 
 
 def example_file(node_type: NodeType, catalog: Catalog) -> str | None:

@@ -43,8 +43,6 @@ class Files:
         if len(self.problems) >= MOST_PROBLEMS:
             raise InputError(self.problems)
 
-    # Roots and paths ------------------------------------------------------------------------------------------------
-
     def roots_of(self, value: Value) -> Roots:
         """Where the file that contains a value may read from."""
         return self._roots.get(value.source) or Roots.of_file(Path("x"), self.asset_roots)
@@ -93,8 +91,6 @@ class Files:
             return None
         return path, roots
 
-    # Merging --------------------------------------------------------------------------------------------------------
-
     def chain(self, document: Document) -> Value:
         documents = self._with_bases(document)
         base = documents.pop().root
@@ -137,8 +133,6 @@ class Files:
             raise InputError([*self.problems, *problems]) from None
         self.own(document, roots)
         return document
-
-    # Types ----------------------------------------------------------------------------------------------------------
 
     def sub_pipeline(self, value: Value) -> Value | None:
         """Return the merged file that a `type` names; None for node types and missing files."""

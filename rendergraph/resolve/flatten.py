@@ -165,8 +165,6 @@ class Flattener(Struct, eq=False):
         hint = suggestion(name, others, most=0) or "; add `type:`"
         self.files.say(node.problem("RG108", f"node '{name}' has no type{hint}", key=True))
 
-    # Parameters -----------------------------------------------------------------------------------------------------
-
     def _parameter(self, name: str, declared: Value, given: Value | None) -> Value | None:
         value = given if given is not None else declared.get("default")
         if value is None or value.data is None:

@@ -77,8 +77,6 @@ class Reading(Struct):
     _warnings: dict[tuple[str, str, str], Problem] = field(default_factory=dict)
     _images: dict[Path, ImageSource] = field(default_factory=dict)
 
-    # Mistakes ---------------------------------------------------------------------------------------------------------
-
     @property
     def warnings(self) -> tuple[Problem, ...]:
         """What was left out, replaced or clamped, in the order of discovery."""
@@ -116,8 +114,6 @@ class Reading(Struct):
         """A path for messages: relative to this file's folder if it lies below."""
         folder = self.path.parent.resolve()
         return shown(str(path.relative_to(folder) if path != self.path and path.is_relative_to(folder) else path))
-
-    # Paths and bytes --------------------------------------------------------------------------------------------------
 
     def resolve(self, name: str, *, line: int = 0, file: Path | None = None) -> Path:
         """Resolve a name in this file to a path inside the roots; the path need not exist."""
@@ -159,8 +155,6 @@ class Reading(Struct):
         size = path.stat().st_size
         if size > self.limits.file_bytes:
             raise self.over(f"{what} '{self._name(path)}' has {size:,} bytes", "file_bytes")
-
-    # Images -----------------------------------------------------------------------------------------------------------
 
     def image(self, path: Path, what: str, *, line: int = 0) -> ImageSource:
         """Return an image file whose header is valid; a file is opened once."""

@@ -128,8 +128,6 @@ class _Reader:
     def _over(self, entry: Value, what: str, limit: str) -> InputError:
         return self.reading.over(what, limit).relocated(entry.relocate)
 
-    # Surfaces, lights, cameras ----------------------------------------------------------------------------------------
-
     def _material(self, name: str, entry: Value) -> None:
         values = plain(entry, scene_keys.MATERIAL)
         textures = {}
@@ -185,8 +183,6 @@ class _Reader:
             turn = math.radians(values.get("rotate_degrees", 0.0))
             return replace(environment, intensity=values.get("intensity", 1.0), rotate=turn)
         return None
-
-    # Objects ----------------------------------------------------------------------------------------------------------
 
     def _object(self, name: str, entry: Value, materials: Sequence[str]) -> None:
         self._check_name(entry, "material", materials, "materials")
@@ -284,8 +280,6 @@ class _Reader:
                 self.validator.report(entry, "RG322", text, key=True)
             self._check_name(entry, "material", materials, "materials")
         return {node: plain(entry, scene_keys.OVERRIDE) for node, entry in entries.items()}
-
-    # Keyframes --------------------------------------------------------------------------------------------------------
 
     def _keyframes(self, top: Value, names: dict[str, tuple[str, ...]]) -> dict[str, tuple[tuple[float, Any], ...]]:
         result = {}

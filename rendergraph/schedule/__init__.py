@@ -206,7 +206,7 @@ def _least(problem: _SchedulingProblem, first: ReadFirst, budget_s: float) -> _O
     bound = min(one.bound for one in found)
     if not first.exhaustive:
         bound = min(bound, peak_floor + min(sizes.values()))
-    best_found = min(found, key=lambda one: (one.cost.pool, one.cost.peak))
+    best_found = min(found, key=lambda one: one.cost[:2])
     return replace(best_found, least=min(one.least for one in found), bound=bound)
 
 
@@ -232,7 +232,7 @@ def _ordered(model: Model, budget: int) -> tuple[Sequence[int], Cost, int, int]:
     orders: list[tuple[Cost, Sequence[int]]] = []
     for order in seeds(model):
         orders.append((model.cost(order), order))
-        if (orders[-1][0].pool, orders[-1][0].peak) == (pool_bound, bound):
+        if orders[-1][0][:2] == (pool_bound, bound):
             break
     least = min(cost.peak for cost, _ in orders)
     if least > bound and len(model) <= MOST_SEARCHED:
@@ -243,13 +243,13 @@ def _ordered(model: Model, budget: int) -> tuple[Sequence[int], Cost, int, int]:
             orders.append((model.cost(better), better))
             least = orders[-1][0].peak
     # Equal costs go to the order found first: the reading order wherever nothing is better.
-    cost, best = min(orders, key=lambda pair: (pair[0].pool, pair[0].peak))
+    cost, best = min(orders, key=lambda pair: pair[0][:2])
     if cost.pool > pool_bound and len(model) <= MOST_SEARCHED:
         from rendergraph.schedule.search import improve  # as above
 
         better, improved = improve(model, best, pool_bound=pool_bound, budget=budget // 5)
         least = min(least, improved.peak)
-        if (improved.pool, improved.peak) < (cost.pool, cost.peak):
+        if improved[:2] < cost[:2]:
             cost, best = improved, better
     return best, cost, least, bound
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Mapping, Sequence
+from typing import NamedTuple
 
 from msgspec import Struct
 
@@ -14,8 +15,8 @@ from rendergraph.textures import TextureDesc
 MUST_LIVE_VISITS = 20_000
 
 
-class Cost(Struct, frozen=True):
-    """The cost of an order.
+class Cost(NamedTuple):
+    """The cost of an order; the lesser of two has the smaller pool, then the lower peak.
 
     Attributes:
         pool: bytes of a pool of textures that are shared within a texel class.
@@ -26,10 +27,6 @@ class Cost(Struct, frozen=True):
     pool: int
     peak: int
     area: int
-
-    @property
-    def key(self) -> tuple[int, int, int]:
-        return self.pool, self.peak, self.area
 
 
 class Model(Struct, frozen=True):

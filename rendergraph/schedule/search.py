@@ -142,7 +142,7 @@ def improve(model: Model, order: Sequence[int], *, pool_bound: int, budget: int)
                 other.insert(target, step)
                 budget -= price
                 found = model.cost(other)
-                if found.key < cost.key:
+                if found < cost:
                     best, cost, improved = other, found, True
                     break
                 if budget <= 0:

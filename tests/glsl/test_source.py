@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from rendergraph.errors import InputError, Problem
-from rendergraph.glsl import Includes, Links, expand, strip_comments
+from rendergraph.glsl import Includes, Links, strip_comments
 from rendergraph.resources import folder as folder_of
 
 
@@ -27,7 +27,7 @@ def problem(error: pytest.ExceptionInfo[InputError]) -> Problem:
 
 def test_lines_know_their_file_and_line(shaders: Path) -> None:
     write(shaders, a__frag='int one;\n#include "b.glsl"\nint four;\n', b__glsl="int two;\nint three;\n")
-    source = expand(shaders / "a.frag", shaders.parent / "include")
+    source = Includes(shaders.parent / "include").expand(shaders / "a.frag")
     rows = [
         (line, o.file.name, o.line) for line, o in zip(source.lines, source.origins, strict=True) if line and o.file
     ]
@@ -46,34 +46,36 @@ def test_a_file_is_compiled_once_a_stage(shaders: Path) -> None:
         b__glsl="int b;\n",
         c__glsl='#include "b.glsl"\n',
     )
-    assert expand(shaders / "a.frag", shaders.parent / "include").text.count("int b;") == 1
+    assert Includes(shaders.parent / "include").expand(shaders / "a.frag").text.count("int b;") == 1
 
 
 def test_what_is_not_beside_the_file_is_taken_from_the_extended_nodes_folders(shaders: Path) -> None:
     base, include = shaders.parent / "base", shaders.parent / "include"
     write(shaders, a__frag='#include "b.glsl"\n#include "d.glsl"\n', d__glsl="int own;\n")
     write(base, b__glsl='#include "c.glsl"\n', c__glsl="int c;\n", d__glsl="int hidden;\n")
-    words = expand(shaders / "a.frag", include, inherited=(base,)).text.split()
+    words = Includes(include).expand(shaders / "a.frag", inherited=(base,)).text.split()
     assert words == ["int", "c;", "int", "own;"]
     with pytest.raises(InputError, match=r"no include 'b\.glsl' beside the file;") as alone:
-        expand(shaders / "a.frag", include)
+        Includes(include).expand(shaders / "a.frag")
     assert problem(alone).code == "RG401"
     write(shaders, a__frag='#include "lihgt.glsl"\n')
     write(base, light__glsl="int light;\n", out__frag='#include "../include/x.glsl"\n')
     with pytest.raises(InputError, match=r"what its node extends; did you mean 'light\.glsl'"):
-        expand(shaders / "a.frag", include, inherited=(base,))
+        Includes(include).expand(shaders / "a.frag", inherited=(base,))
     with pytest.raises(InputError, match="RG406"):
-        expand(base / "out.frag", include, inherited=(shaders,))  # neither from beside the file nor from the other
+        Includes(include).expand(
+            base / "out.frag", inherited=(shaders,)
+        )  # neither from beside the file nor from the other
 
 
 @pytest.mark.parametrize("opens", ["if X", "ifdef X", "ifndef X"])
 def test_an_include_that_may_not_be_compiled_does_not_hide_a_later_one(shaders: Path, opens: str) -> None:
     write(shaders, a__frag=f'#{opens}\n#include "b.glsl"\n#endif\n#include "b.glsl"\n', b__glsl="int b;\n")
-    text = expand(shaders / "a.frag", shaders.parent / "include").text
+    text = Includes(shaders.parent / "include").expand(shaders / "a.frag").text
     assert text.count("int b;") == 2
     assert text.count("#ifndef INCLUDED_0") == 2
     write(shaders, a__frag=f'#{opens}\n#endif\n#include "b.glsl"\n#include "b.glsl"\n')
-    text = expand(shaders / "a.frag", shaders.parent / "include").text
+    text = Includes(shaders.parent / "include").expand(shaders / "a.frag").text
     assert text.count("int b;") == 1
     assert "INCLUDED" not in text
 
@@ -82,7 +84,7 @@ def test_comments_keep_their_room_and_hide_includes(shaders: Path) -> None:
     assert strip_comments("a /* b\nc */ d // e\nf") == "a     \n     d     \nf"
     assert strip_comments("a // b\n/* c */ /* d\ne") == "a     \n        /* d\ne"  # for the driver to say so
     write(shaders, a__frag='// #include "nowhere.glsl"\n/*\n#include "nowhere.glsl"\n*/\n')
-    assert expand(shaders / "a.frag", shaders.parent / "include").text.strip() == ""
+    assert Includes(shaders.parent / "include").expand(shaders / "a.frag").text.strip() == ""
 
 
 @pytest.mark.parametrize(
@@ -102,7 +104,7 @@ def test_comments_keep_their_room_and_hide_includes(shaders: Path) -> None:
 def test_what_is_wrong_with_an_include(shaders: Path, text: str, code: str, line: int, says: str) -> None:
     write(shaders, a__frag=text, light__glsl="", loop__glsl='#include "loop2.glsl"', loop2__glsl='#include "loop.glsl"')
     with pytest.raises(InputError, match=code) as error:
-        expand(shaders / "a.frag", shaders.parent / "include")
+        Includes(shaders.parent / "include").expand(shaders / "a.frag")
     found = problem(error)
     assert says in found.text
     assert found.place is not None
@@ -115,7 +117,7 @@ def test_a_link_does_not_lead_out_of_the_root(shaders: Path, tmp_path: Path) -> 
     (shaders / "inside.glsl").symlink_to(tmp_path / "secret.glsl")
     write(shaders, a__frag='#include "inside.glsl"\n')
     with pytest.raises(InputError, match="RG406"):
-        expand(shaders / "a.frag", shaders.parent / "include")
+        Includes(shaders.parent / "include").expand(shaders / "a.frag")
 
 
 def test_links_are_followed_as_the_system_does(tmp_path: Path) -> None:
@@ -145,13 +147,13 @@ def test_limits_of_depth_and_size(shaders: Path) -> None:
         (shaders / f"n{number}.glsl").write_text(f'#include "n{number + 1}.glsl"\n')
     write(shaders, n40__glsl="", big__frag="int a;\n" * 200_000, a__frag='#include "n0.glsl"\n')
     with pytest.raises(InputError, match="RG403 includes are nested deeper than 32"):
-        expand(shaders / "a.frag", shaders.parent / "include")
+        Includes(shaders.parent / "include").expand(shaders / "a.frag")
     with pytest.raises(InputError, match="RG403 the shader is larger than 1,000,000 bytes"):
-        expand(shaders / "big.frag", shaders.parent / "include")
+        Includes(shaders.parent / "include").expand(shaders / "big.frag")
     write(shaders, half__glsl="int a;\n" * 100_000)
     write(shaders, b__frag='#if A\n#include "half.glsl"\n#endif\n#if B\n#include "half.glsl"\n#endif\n')
     with pytest.raises(InputError, match="with its includes is larger than 1,000,000 bytes") as error:
-        expand(shaders / "b.frag", shaders.parent / "include")
+        Includes(shaders.parent / "include").expand(shaders / "b.frag")
     place = problem(error).place
     taken = 6 + 700_000 + 7 + 6  # three directives, and all of the file once
     assert place is not None
@@ -161,10 +163,10 @@ def test_limits_of_depth_and_size(shaders: Path) -> None:
 def test_missing_and_unreadable_files(shaders: Path) -> None:
     write(shaders, glow__frag="")
     with pytest.raises(InputError, match=r"RG400 there is no shader .*glov\.frag'; did you mean 'glow\.frag'\?"):
-        expand(shaders / "glov.frag", shaders.parent / "include")
+        Includes(shaders.parent / "include").expand(shaders / "glov.frag")
     (shaders / "latin.frag").write_bytes(b"int a; \xe9\n")
     with pytest.raises(InputError, match="RG407 the shader is not UTF-8"):
-        expand(shaders / "latin.frag", shaders.parent / "include")
+        Includes(shaders.parent / "include").expand(shaders / "latin.frag")
 
 
 def test_includes_of_two_prefixes_are_both_there(shaders: Path) -> None:
@@ -190,10 +192,10 @@ def test_error_pages_say_what_is_said(shaders: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.chdir(shaders)
     write(shaders, glow__frag=page["wrong"], kernel__glsl="", secret__glsl="")
     with pytest.raises(InputError, match=code) as error:
-        expand(shaders / "glow.frag", shaders.parent / "include")
+        Includes(shaders.parent / "include").expand(shaders / "glow.frag")
     assert message_of(error.value) == page["message"]
     write(shaders, glow__frag=page["right"])
-    expand(shaders / "glow.frag", shaders.parent / "include")
+    Includes(shaders.parent / "include").expand(shaders / "glow.frag")
 
 
 def test_error_pages_of_files(shaders: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -203,5 +205,5 @@ def test_error_pages_of_files(shaders: Path, monkeypatch: pytest.MonkeyPatch) ->
     (shaders / "latin.frag").write_bytes(pages["RG407"]["wrong"].encode("latin-1"))
     for code, name in (("RG400", "glov.frag"), ("RG403", "big.frag"), ("RG407", "latin.frag")):
         with pytest.raises(InputError, match=code) as error:
-            expand(shaders / name, shaders.parent / "include")
+            Includes(shaders.parent / "include").expand(shaders / name)
         assert message_of(error.value) == pages[code]["message"]

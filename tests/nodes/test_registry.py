@@ -11,7 +11,7 @@ import rendergraph as rg
 from rendergraph.authoring.examine import doc_problems, examine
 from rendergraph.catalog import Catalog
 from rendergraph.declare import Node, declaration_mistakes
-from rendergraph.glsl import expand
+from rendergraph.glsl import Includes
 from rendergraph.glsl.source import needs
 from rendergraph.resources import folder, shipped_pipelines
 
@@ -67,7 +67,7 @@ def test_it_passes_check_node(name: str) -> None:
 def test_shaders_exist_and_their_includes_resolve(name: str) -> None:
     for shader in shader_names(name):
         file = resolved(name, shader)
-        assert expand(file, SHADERS / "include", root=file.parent).lines
+        assert Includes(SHADERS / "include").expand(file, root=file.parent).lines
 
 
 def open_parameters() -> set[tuple[str, str, str]]:
@@ -101,7 +101,7 @@ def test_no_shader_is_an_orphan() -> None:
     for shader in list(used):
         used |= {
             origin.file.resolve()
-            for origin in expand(shader, SHADERS / "include", root=shader.parent).origins
+            for origin in Includes(SHADERS / "include").expand(shader, root=shader.parent).origins
             if origin.file is not None
         }
     spare = {SHADERS / "include" / name for name in ("frame.glsl", "view.glsl", "fullscreen.vert")}

@@ -96,8 +96,6 @@ class _Reader:
             if entries:
                 self._reading.warn("RG333", what, f"{what} are left out; the rest pose is drawn")
 
-    # Parts ------------------------------------------------------------------------------------------------------------
-
     def _mesh(self, mesh: schema.Mesh, number: int) -> list[tuple[int, int]]:
         """Mesh and material index of each triangle primitive; material -1 is the default one."""
         result = []
@@ -198,8 +196,6 @@ class _Reader:
             raise self._error(f"{where}: ROTATION has a quaternion of length zero")
         rows = zip(translations, rotations, scales, strict=True)
         return [placement(at, quaternion_matrix(*turn), scale) for at, turn, scale in rows]
-
-    # The scene --------------------------------------------------------------------------------------------------------
 
     def scene(self) -> Scene:
         roots = self._roots()

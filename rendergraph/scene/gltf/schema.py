@@ -298,8 +298,7 @@ def _constant(word: str) -> float:
     raise ValueError(f"{word} is not allowed")
 
 
-def check_index(reading: Reading, index: int, items: Sequence[object] | int, where: str, what: str) -> None:
-    """Check an index into a list, or into one of so many items; an absent one is valid."""
-    count = items if isinstance(items, int) else len(items)
-    if index >= count:
-        raise reading.error("RG304", f"{where} is {index}, but there are {count} {what}")
+def check_index(reading: Reading, index: int, items: Sequence[object], where: str, what: str) -> None:
+    """Check an index into a list; an absent one is valid."""
+    if index >= len(items):
+        raise reading.error("RG304", f"{where} is {index}, but there are {len(items)} {what}")

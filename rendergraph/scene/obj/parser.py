@@ -223,8 +223,6 @@ class _Block:
         end = self.starts[row] + self.lengths[row]
         return self.block[self.word_ends[self.first_word[row]] : end].strip()
 
-    # Numbers ----------------------------------------------------------------------------------------------------------
-
     def _text(self, rows: Ints, slashes: bool = False) -> bytes:
         """The arguments of some lines as one text, the first words blanked."""
         keep = np.zeros(len(self.starts), bool)
@@ -301,8 +299,6 @@ class _Block:
         if colored.any():
             colors[colored] = values[(at + counts - 3)[colored, None] + np.arange(3)]
         self._add("colors", colors)
-
-    # Faces ------------------------------------------------------------------------------------------------------------
 
     def _faces(self, rows: list[Ints], kinds: npt.NDArray[np.int8]) -> None:
         faces = rows[3]
