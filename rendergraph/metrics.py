@@ -70,14 +70,8 @@ def measure(
 ) -> tuple[Metrics, Pixels]:
     """Return the metrics of a picture against a reference, and FLIP at each pixel: (height, width), 0…1.
 
-    The metrics are NaN if a picture contains NaN or infinity.
-
-    Args:
-        image, reference: (height, width, channels), uint8 or 0…1 for `display`, linear light for `linear`, any values
-            for `values`.
-        encoding: of both.
-        names: of both, for messages.
-        plugins: metrics that plugins add.
+    The pictures are (height, width, channels): uint8 or 0…1 for `display`, linear light for `linear`, any values for
+    `values`. The metrics are NaN if a picture contains NaN or infinity.
 
     Raises:
         InputError: the sizes differ, or a plugin's metric fails.

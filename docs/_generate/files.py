@@ -94,5 +94,5 @@ def _documented(of: str, kind: str, limits: Any) -> list[tuple[str, str, int, st
     return [
         (of, about[name].rstrip("."), most, f"{kind}-{name.replace('_', '-')}=N")
         for name, most in values.items()
-        if name in about
+        if name in about and isinstance(most, int)
     ]

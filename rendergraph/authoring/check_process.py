@@ -51,11 +51,9 @@ class CheckLimits:
 def check_node(
     file: Path, *, plugins: Sequence[Path] = (), scene: str | None = None, limits: CheckLimits = CheckLimits()
 ) -> Report:
-    """Examine the node of a file in a child process; `scene` is what geometry nodes draw, a shipped name or a file.
+    """Examine the node of a file in a child process; geometry nodes render `scene`, a shipped name or a file.
 
-    Raises:
-        InputError: it cannot be loaded, ends or crashes its process, hangs, or takes too much memory.
-        DeviceError: there is no usable GL device.
+    An InputError says that it cannot be loaded, ends or crashes its process, hangs, or needs too much memory.
     """
     if file.suffix not in (".py", *SHADERS) or file.is_dir():
         kinds = f"a Python module or a shader file ({', '.join(SHADERS)})"

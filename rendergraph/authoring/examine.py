@@ -61,7 +61,6 @@ def _plugin_of(file: Path) -> Path:
 
 
 def examine(node: NodeType, scene: str = SCENE, on_stage: OnStage = lambda stage, what: None) -> Report:
-    """Examine a type in every variant."""
     severity: Literal["error", "warning"] = "warning" if node.is_shader else "error"
     problems = [*node.warnings, *_declared(node)]
     with tempfile.TemporaryDirectory() as folder:

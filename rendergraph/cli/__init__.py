@@ -12,14 +12,7 @@ from rendergraph.cli.watchdog import watch
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run one command line, as `rendergraph.cli.app.main`; without words the process's own, which it prepares for that.
-
-    Args:
-        args: words after the program's name; the process's own by default.
-
-    Returns:
-        The exit code of design.md §7.
-    """
+    """Run one command line, by default the process's own, and return the exit code of design.md §7."""
     if args is None:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy's threads wait for matrices that nothing here has
         gc.set_threshold(100_000)  # what is made at the start stays: to look for cycles in it takes up to 20 ms

@@ -18,12 +18,7 @@ if TYPE_CHECKING:
 def draw_in_parts(
     expanded: Expanded, targets: Sequence[Target], farm: Executor, *, warnings: Warnings, quiet: bool
 ) -> dict[str, Any]:
-    """Draw and write everything; the document of `--json`. Paths are printed unless `quiet`.
-
-    Raises:
-        InputError: the frames cannot be drawn in parts, or a mistake in a shader.
-        RenderError: it failed while drawing or writing.
-    """
+    """Render and write everything, and return the document of `--json`. Paths are printed unless `quiet`."""
     from rendergraph import images
     from rendergraph.farm.frames import FrameFile, RenderedFrame, render_chunks, split_frames
     from rendergraph.images.files import write_file

@@ -284,11 +284,7 @@ def selection_options(function: F) -> F:
 
 
 def linked(selection: Selection) -> Pipeline:
-    """Return the Python API's pipeline, linked; print its warnings.
-
-    Raises:
-        InputError: with all errors.
-    """
+    """Return a linked pipeline, and print its warnings."""
     from rendergraph.session import Pipeline
 
     pipeline = Pipeline(selection)
@@ -353,12 +349,7 @@ def put(text: str, output: Path | None, *, as_json: bool = False) -> None:
 
 
 def write(text: str, output: Path) -> None:
-    """Write text to a file, whole or not at all.
-
-    Raises:
-        InputError: the file cannot be written there.
-        RenderError: writing failed.
-    """
+    """Write text to a file, whole or not at all."""
     from rendergraph.images import check_target
     from rendergraph.images.files import write_file
 

@@ -103,7 +103,7 @@ def diff_svg(a: Graph, b: Graph, difference: GraphDiff) -> str:
 
 
 def _both(a: Graph, b: Graph, difference: GraphDiff) -> tuple[Sheet, dict[str, Mark], dict[Link, str]]:
-    """Both graphs as one, with marks on nodes and links that only one of them has."""
+    """Return both graphs as one, with marks on nodes and links that only one of them has."""
     old, new = sheet(a), sheet(b)
     names = {node.id: difference.nodes.get(node.id, node.id) for node in a.nodes}
     for node in difference.removed:
@@ -128,7 +128,7 @@ def _both(a: Graph, b: Graph, difference: GraphDiff) -> tuple[Sheet, dict[str, M
 
 
 def _backwards(link: Link, present: Sequence[Link]) -> Link:
-    """A link of the first graph, drawn as leading back where the second graph has its ends the other way round."""
+    """Return a link of the first graph, which leads back if its ends have the opposite order in the second graph."""
     reached, waiting = {link.target}, [link.target]
     while waiting:
         at = waiting.pop()
@@ -139,7 +139,7 @@ def _backwards(link: Link, present: Sequence[Link]) -> Link:
 
 
 def _with_input(card: Card, port: str, old: Card) -> Card:
-    """The card with the port of the old card, where it lacks it."""
+    """Return the card with the port of the old card, if it lacks it."""
     present = {socket.name for socket in card.inputs}
     return replace(card, inputs=(*card.inputs, *(s for s in old.inputs if s.name == port and port not in present)))
 

@@ -40,7 +40,7 @@ class ParameterChange(Struct, frozen=True):
 
 
 class LinkChange(Struct, frozen=True):
-    """What an input reads in both graphs, `node.port` as in the file; empty where it is not connected."""
+    """The sources of an input in both graphs, `node.port` as in the file; empty if it is not connected."""
 
     node: str  # named as in the second graph where it exists there
     port: str
@@ -57,19 +57,19 @@ class OutputChange(Struct, frozen=True):
 
 
 class GraphDiff(Struct, frozen=True):
-    """What turns one graph into another.
+    """The changes that turn one graph into another.
 
     Attributes:
-        names: the two pipelines.
+        names: of the two pipelines.
         nodes: first graph's node to the second's, for all that were recognised.
         added, removed: nodes that only the second, only the first graph has.
         disabled: nodes among these that the other graph disables with `enabled: false`.
-        renamed: old id to new id, where nothing but the id differs.
+        renamed: old id to new id, if only the id differs.
         retyped: nodes of another type under the same id.
-        parameters: values that differ; of retyped nodes, those that one of the types lacks only where they are set.
+        parameters: values that differ; of retyped nodes, those that one of the types lacks only if they are set.
         links: inputs that read something else, without those of added and removed nodes.
-        outputs: what the pipelines show.
-        sizes: both sizes where they differ.
+        outputs: those that show another port.
+        sizes: both sizes if they differ.
     """
 
     names: tuple[str, str]

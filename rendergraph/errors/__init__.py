@@ -1,8 +1,8 @@
 """Problems, where they are, and the exceptions that carry them.
 
 A *problem* is one mistake with its place; an exception carries all problems found before stopping. Each code has one
-file beside this module, `RG103-unknown-param.yaml`, with the wrong text, its exact message and the mended text; tests,
-docs and `rendergraph explain RG103` read it.
+file beside this module, `RG103-unknown-param.yaml`, with the wrong text, its exact message and the corrected text;
+tests, docs and `rendergraph explain RG103` read it.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ _LONGEST_OPTION = 80
 
 
 class Option(Struct, frozen=True):
-    """A command-line option as the origin of a mistake, or the argument of the Python API that stands for it.
+    """A command-line option as the origin of a mistake, or the argument of the Python API that corresponds to it.
 
     Attributes:
         name: `--set`, or `patch` for a patch given in Python.
-        text: what was given, as typed; empty where only the option matters.
+        text: as typed; empty if only the option matters.
     """
 
     name: str
@@ -41,10 +41,9 @@ class Option(Struct, frozen=True):
 
 
 class Place(Struct, frozen=True):
-    """A place in a file, or an option; line and column start at 1, 0 where the origin has no lines (a mesh, an option).
+    """A place in a file, as messages name it, or an option.
 
-    Attributes:
-        origin: a file as messages name it, or what the user typed.
+    Line and column start at 1; they are 0 for an origin without lines, such as a mesh or an option.
     """
 
     origin: str | Option
@@ -57,7 +56,7 @@ class Place(Struct, frozen=True):
         return self.origin if isinstance(self.origin, str) else ""
 
     def option(self, *names: str) -> Option | None:
-        """The option that this is a place in, where it has one of the names."""
+        """Return the option that this place is in, if it has one of the names."""
         return self.origin if isinstance(self.origin, Option) and self.origin.name in names else None
 
     def __str__(self) -> str:
@@ -72,12 +71,12 @@ class Problem(Struct, frozen=True, eq=False):
     Attributes:
         code: `RG` and three digits.
         text: what is wrong and the fix, in one line.
-        place: where the user can mend it; None where there is no such place.
-        line_text: the line of the file, empty where unknown.
-        severity: an `error` stops, a `warning` is reported and the work goes on.
-        subject: the name of what is wrong: a port, a parameter, an argument, a resource; empty for the whole.
+        place: where the user can correct it, if there is such a place.
+        line_text: the line of the file, empty if unknown.
+        severity: an `error` stops, a `warning` is reported and the work continues.
+        subject: the name of a port, a parameter, an argument, or a resource that is wrong; empty for the whole.
         context: the node, the file or the option that the problem concerns, printed before the text.
-        cause: the line of a plugin author's code that it comes from, where `place` is one of the pipeline's.
+        cause: the line of a plugin author's code that it comes from, if `place` is one of the pipeline's.
         hint: what only the caller knows, printed after the text.
     """
 
@@ -104,7 +103,7 @@ class Problem(Struct, frozen=True, eq=False):
 
     @property
     def message(self) -> str:
-        """The text with all that is printed around it: `context: file:line: text; hint`."""
+        """The text with everything that is printed around it: `context: file:line: text; hint`."""
         cause = f"{self.cause.origin}:{self.cause.line or ''}".rstrip(":") if self.cause else ""
         return ": ".join(filter(None, (self.context, cause, self.text))) + self.hint
 
@@ -128,15 +127,13 @@ class Problem(Struct, frozen=True, eq=False):
         cause: Place | None = None,
         hint: str = "",
     ) -> Problem:
-        """Return the same problem at another place, where its reader can mend it.
+        """Return the same problem at another place, where its reader can correct it.
 
         Args:
-            place: the new place.
-            line_text: the line of the file there.
-            code: the new code, where the same mistake has another one there.
-            context: printed before everything else.
-            cause: the plugin author's line, where the problem has none yet.
-            hint: printed after everything else, with its own punctuation.
+            place, line_text: the new place, and the line of the file there.
+            code: the new code, if the same mistake has another one there.
+            context, hint: printed before and after everything else.
+            cause: the plugin author's line, if the problem has none yet.
         """
         context = ": ".join(filter(None, (context, self.context)))
         return replace(
@@ -154,11 +151,11 @@ class Problem(Struct, frozen=True, eq=False):
         return replace(self, place=self.cause or place, line_text="", cause=None)
 
     def as_warning(self) -> Problem:
-        """Return the same as a warning."""
+        """Return the problem as a warning."""
         return replace(self, severity="warning")
 
     def as_json(self) -> dict[str, object]:
-        """Return what messages show as plain JSON values."""
+        """Return the fields of the message as plain JSON values."""
         return {
             "code": self.code,
             "severity": self.severity,
@@ -193,17 +190,13 @@ class InputError(RendergraphError):
 
 
 class RenderError(RendergraphError):
-    """It failed while running: disk, memory, GL."""
+    """Rendering or writing failed: disk, memory, GL."""
 
     exit_code = 1
 
 
 class Interruption(BaseException):
-    """Somebody wants the program to end; nothing on the way up takes it for a failure of its own.
-
-    Attributes:
-        number: the signal's.
-    """
+    """A signal ends the program; no handler of errors catches it."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
@@ -211,14 +204,15 @@ class Interruption(BaseException):
 
 
 def is_interruption(error: BaseException) -> bool:
-    """Whether what came out of a stranger's code is none of that code's doing; anything else is, `SystemExit` too."""
+    """Return whether an exception ends the program, rather than being a fault of the third-party code."""
     return isinstance(error, KeyboardInterrupt | Interruption)
 
 
 class Misuse(Exception):
-    """What a node's author asked for and cannot have, said where the author's call is still on the stack.
+    """A mistake of a node's author, raised while the author's call is on the stack.
 
-    The stage that called the node turns it into an `InputError` that names node, pipeline line and the author's line.
+    The stage that called the node turns it into an `InputError` with the node, the pipeline's line and the author's
+    line.
     """
 
     def __init__(self, text: str, code: str = "RG423") -> None:
@@ -227,10 +221,9 @@ class Misuse(Exception):
 
 
 class SceneError(Exception):
-    """What a node says of a scene that it cannot work on, in a rule of its ports, `record` or `update`: for users.
+    """A node cannot use this scene: raised in a rule of its ports, in `record` or `update`, for users.
 
-    Attributes:
-        subject: the name that it speaks of, as a parameter has it; the message is shown there.
+    `subject` may name a parameter, whose place is then that of the message.
     """
 
     def __init__(self, text: str, subject: str = "") -> None:
@@ -239,24 +232,24 @@ class SceneError(Exception):
 
 
 class UsageError(RendergraphError):
-    """The command line itself is malformed."""
+    """The command line is malformed."""
 
     exit_code = 2
 
 
 class DeviceError(RendergraphError):
-    """No usable GL device."""
+    """There is no usable GL device."""
 
     exit_code = 5
 
 
 def printable(text: str) -> str:
-    """The text with control characters escaped, so that it stays in one line of a message."""
+    """Return the text with control characters escaped, so that it stays in one line of a message."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
 
 
 def shown_file(file: str | Path) -> str:
-    """A path as messages print it: relative to the current folder where it lies inside."""
+    """Return a path as messages print it: relative to the current folder if it lies inside."""
     try:
         return Path(file).relative_to(Path.cwd()).as_posix()
     except (ValueError, OSError):  # elsewhere, or the current folder is gone
@@ -264,15 +257,15 @@ def shown_file(file: str | Path) -> str:
 
 
 def is_framework(module: str) -> bool:
-    """Whether a module is the framework's; the standard nodes are authors like anybody."""
+    """Return whether a module is the framework's; the standard nodes count as plugins."""
     return module == "rendergraph" or (module.startswith("rendergraph.") and not module.startswith("rendergraph.nodes"))
 
 
 def nearest(word: str, words: Iterable[str], *, floor: float = 0.6) -> str | None:
-    """The word a user most likely meant, or None.
+    """Return the word that a user most likely meant, or None.
 
-    `difflib` alone misses beginnings (`--env` for `--environment`, `kernal` for `kernel_size`), so the one word that
-    begins so comes first, and words that are near to one of the tokens count too.
+    `difflib` alone misses prefixes (`--env` for `--environment`, `kernal` for `kernel_size`), so a single word with
+    that prefix comes first, and words that are similar to one of the tokens count, too.
     """
     from difflib import get_close_matches  # where something is misspelt alone
 
@@ -292,7 +285,7 @@ def nearest(word: str, words: Iterable[str], *, floor: float = 0.6) -> str | Non
 
 
 def node_named(node: str, node_type: str) -> str:
-    """How messages name a node: with its type, where that is not the same word."""
+    """Return how messages name a node: with its type, unless that is the same word."""
     return f"node '{node}'" + (f" ({node_type})" if node_type not in ("", node) else "")
 
 

@@ -61,12 +61,10 @@ class Bundle:
 
 
 def make_bundle(read: Iterable[str], plugins: Sequence[Path], modules: Iterable[str] = ()) -> Bundle:
-    """Collect what the work needs.
+    """Collect the files that the work needs.
 
-    Args:
-        read: files and folders that planning has looked for, whether they exist or not.
-        plugins: files and folders with nodes that were named.
-        modules: the modules of the node classes in use; those of installed packages must be installed there, too.
+    `read` are the files and folders that planning has looked for, whether they exist or not; `modules` those of the
+    node classes in use: installed packages among them must be installed on the workers, too.
     """
     shipped = [folder(name).resolve() for name in SHIPPED]
     paths = [path for path in map(Path, read) if not any(path.resolve().is_relative_to(root) for root in shipped)]

@@ -90,7 +90,7 @@ class Dask(Executor):
         cluster: Cluster = None,
         owned: bool = False,
     ) -> None:
-        """Use a client, which is closed at the end where it is `owned`, like a cluster that was started for it."""
+        """Use a client, which is closed at the end if it is `owned`, like a cluster that was started for it."""
         super().__init__()
         workers = _workers(client)
         self._resources = {"GPU": 1} if any("GPU" in each["resources"] for each in workers.values()) else None
@@ -153,7 +153,7 @@ class Dask(Executor):
                 return
 
     def _upload_again(self) -> None:
-        """Send everything once more, as the workers that had some of it are gone."""
+        """Send everything once more, because the workers that had some of it are gone."""
         contents = dict(self._values)
         for digest, path in self._paths.items():
             contents[digest] = path.read_bytes() if path.is_file() else b""
@@ -210,7 +210,7 @@ class Dask(Executor):
                 yield from self._events_of(task, future)
 
     def _check_scheduler(self, gone: float | None) -> float | None:
-        """Return since when the scheduler has not answered, None where it does; refuse to wait too long."""
+        """Return since when the scheduler has not answered, None if it does; a RenderError ends a long wait."""
         if self._client.status == "running":
             return None
         gone = gone or time.monotonic()

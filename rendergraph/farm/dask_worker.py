@@ -22,7 +22,7 @@ from rendergraph.farm.worker_process import WorkerProcess
 
 
 class WorkerSetup(WorkerPlugin):
-    """One on each worker for as long as the executor exists; tasks find it by its name."""
+    """One on each worker while the executor exists; tasks find it by its name."""
 
     def __init__(
         self, name: str, packages: Mapping[str, tuple[str, str]], devices: Sequence[int | None], timeout: float

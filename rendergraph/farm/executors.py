@@ -37,12 +37,8 @@ def make_executor(
 ) -> AbstractContextManager[Executor]:
     """Return the chosen executor, to be closed by a `with` statement, which leaves open one that was given.
 
-    The default is this process, or for several tasks as many processes as the machine has devices, or cores where it
-    has a software rasteriser alone. Work with in-memory node classes does not travel to other processes.
-
-    Raises:
-        UsageError: there is no such executor, or a package that it needs is missing.
-        RenderError: the cluster cannot be reached.
+    The default is this process, or for several tasks as many processes as the machine has devices, or cores if it has
+    only a software rasteriser. Work with in-memory node classes does not travel to other processes.
     """
     if isinstance(choice, Executor):
         return nullcontext(choice)

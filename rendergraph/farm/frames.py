@@ -31,7 +31,7 @@ LONGEST_CHUNK = 64
 
 @dataclass(frozen=True)
 class FrameFile:
-    """A file that is made of each frame, of an output or a tap; without a suffix bare pixels, as a video takes them."""
+    """A file of each frame, of an output or a tap; without a suffix bare pixels, as a video needs them."""
 
     name: str
     suffix: str
@@ -49,7 +49,7 @@ class RenderedFrame:
 
 @dataclass(frozen=True, eq=False)
 class FrameChunk(Task):
-    """Consecutive frames; `lead` more are rendered before them, where earlier frames matter."""
+    """Consecutive frames; `lead` more are rendered before them, if frames depend on earlier ones."""
 
     selection: Selection
     options: RenderOptions
@@ -62,7 +62,7 @@ class FrameChunk(Task):
         return f"frames {frames[0]}-{frames[-1]}"
 
     def run(self, worker: Worker) -> Iterator[RenderedFrame | Frame]:
-        """Yield each frame, and at last the last one without its pictures, for its times."""
+        """Yield each frame, and then the last one without its pictures, for its times."""
         pipeline = Pipeline(relocate_selection(self.selection, worker.root))
         expanded = stages.expand(pipeline.link(), self.options)
         frame: Frame | None = None

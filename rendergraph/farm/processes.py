@@ -1,4 +1,4 @@
-"""Tasks by several processes of this machine; the loss of one costs a task another attempt, and nothing else."""
+"""Tasks in several processes of this machine; if one is lost, its task begins again, and nothing else is affected."""
 
 from __future__ import annotations
 

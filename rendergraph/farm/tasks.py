@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
 from rendergraph.errors import DeviceError, InputError, Problem, RenderError, RendergraphError
@@ -39,12 +38,10 @@ class Task(ABC):
 
     @abstractmethod
     def run(self, worker: Worker) -> Iterator[Any]:
-        """Yield each result as soon as it is there: values that can be pickled.
+        """Yield each result as soon as it exists: values that can be pickled.
 
-        The task may be begun again on another worker after some of them; the caller then drops the earlier ones.
-
-        Raises:
-            RendergraphError: it cannot be done. If `is_retryable`, another worker gets the task.
+        A RendergraphError says why it fails. If that `is_retryable`, the task begins again on another worker, and the
+        caller drops the earlier results.
         """
 
 
@@ -120,7 +117,7 @@ Event: TypeAlias = "TaskOutput | TaskFinished | TaskRetried | TaskFailed"
 
 
 class Executor(AbstractContextManager["Executor"], ABC):
-    """Takes tasks and reports what becomes of them. One thread uses it; leaving its block ends whatever still runs."""
+    """Takes tasks and reports what becomes of them. One thread uses it; leaving its block ends all running tasks."""
 
     workers: int
 
@@ -135,14 +132,12 @@ class Executor(AbstractContextManager["Executor"], ABC):
     def events(self) -> Iterator[Event]:
         """Yield what happens, until every submitted task has finished or failed.
 
-        Raises:
-            DeviceError: no worker has a usable GL device.
-            RenderError: the cluster is gone.
+        A DeviceError says that no worker has a usable GL device, a RenderError that the cluster is gone.
         """
 
     @abstractmethod
     def close(self) -> None:
-        """End it at once, with all running tasks."""
+        pass
 
     @abstractmethod
     def put(self, value: Any) -> Handle:
@@ -152,7 +147,7 @@ class Executor(AbstractContextManager["Executor"], ABC):
         """Send the input files to workers that do not share a disk with this process, and check their packages."""
 
     def retry(self, task: Task, worker: str, error: RendergraphError, *, inputs_lost: bool = False) -> Event:
-        """Submit a task again whose worker was lost, unless that was too often; its inputs may go with every worker."""
+        """Submit a task again whose worker was lost, unless that was too often; with a worker, inputs may be lost."""
         self._lost[task, inputs_lost] += 1
         if self._lost[task, inputs_lost] < (self.workers + 1 if inputs_lost else ATTEMPTS):
             self.submit(task)
@@ -162,9 +157,7 @@ class Executor(AbstractContextManager["Executor"], ABC):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
 

@@ -33,7 +33,7 @@ class ChildProcess:
     """A Python process that was started here, and this end of its pipe.
 
     It is not started by `multiprocessing`, which would run the caller's script once more, and it is not in the
-    terminal's process group: Ctrl-C reaches this process alone, which ends the other one.
+    terminal's process group: Ctrl-C reaches only this process, which ends the other one.
     """
 
     def __init__(
@@ -69,11 +69,9 @@ class ChildProcess:
         return timeout if self._has_answered else max(timeout, STARTUP_TIMEOUT)
 
     def receive(self, timeout: float) -> Any:
-        """Wait for the next message.
+        """Wait for the next message; TimeoutError if none came in time.
 
-        Raises:
-            TimeoutError: none came in time.
-            EOFError: the process has ended; the text is the signal's name, or the exit code.
+        An EOFError says that the process has ended; its text is the signal's name, or the exit code.
         """
         try:
             if not self.pipe.poll(timeout):
@@ -128,7 +126,7 @@ class WorkerProcess:
         environment: Mapping[str, str] | None = None,
         **folders: str,
     ) -> None:
-        """Hand over a task with pickled values by digest; start a process if necessary. A process gets each value once.
+        """Send a task with pickled values by digest, each once; start a process if necessary.
 
         The environment and the folders (`root`, `home` of `run_tasks`) are of a process that is started.
         """
@@ -154,7 +152,7 @@ class WorkerProcess:
         """Wait for the next message about the task: `(item, value)`, `(finished, seconds)` or `(failed, error)`.
 
         Raises:
-            RenderError: the process has ended, or has hung and was ended.
+            RenderError: the process has ended, or made no progress and was terminated.
             DeviceError: it has no usable GL device.
         """
         assert self.child is not None

@@ -24,11 +24,7 @@ _KINDS_WITH_PROGRAM = ("fullscreen", "geometry", "draw", "compute")
 
 
 def find_node_of_type(node_type: NodeType, catalog: Catalog, select: Callable[[str], Selection]) -> tuple[Linked, str]:
-    """Return the example of a node type, changed by the options in `select`, and the id of the type's node in it.
-
-    Raises:
-        InputError: there is no example, as no shipped pipeline has what the node needs.
-    """
+    """Return the example of a node type, changed by the options in `select`, and the id of the type's node in it."""
     import yaml  # other topics need no YAML
 
     text = example_file(node_type, catalog)
@@ -52,15 +48,7 @@ def find_node_of_type(node_type: NodeType, catalog: Catalog, select: Callable[[s
 def describe_program(linked: Linked, node: str, number: int | None) -> dict[str, Any]:
     """Return what is in scope in a step of a node, and the final text of its shaders.
 
-    Args:
-        linked: the pipeline.
-        node: id of the node.
-        number: of the step, as `plan` counts; None for the first that has a program
-            and is not for a persistent value, such as a table.
-
-    Raises:
-        InputError: no such node, or it has no program of its own.
-        UsageError: no such step, or it has no program.
+    The number is that of `plan`; None selects the first step that has a program.
     """
     expansion, steps = _steps_with_program(linked, node)
     kept = {id for id, resource in expansion.resources.items() if resource.role == "kept"}
@@ -75,11 +63,7 @@ def describe_program(linked: Linked, node: str, number: int | None) -> dict[str,
 
 
 def describe_programs(linked: Linked, node: str) -> list[dict[str, Any]]:
-    """Return `describe_program` of every step that has a program.
-
-    Raises:
-        InputError: as from `describe_program`.
-    """
+    """Return `describe_program` of every step that has a program."""
     expansion, steps = _steps_with_program(linked, node)
     return [_describe(linked, expansion, steps, step) for step in steps]
 

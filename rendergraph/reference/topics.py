@@ -54,16 +54,10 @@ def file_keys(kind: str) -> list[dict[str, Any]]:
 
 
 def error_codes() -> list[str]:
-    """Return all error codes."""
     return sorted(path.name.partition("-")[0] for path in folder("rendergraph.errors").glob("RG*.yaml"))
 
 
 def error_page(code: str) -> dict[str, Any]:
-    """Return the page of an error code.
-
-    Raises:
-        InputError: no such code.
-    """
     import yaml  # other topics need no YAML
 
     path = next(folder("rendergraph.errors").glob(f"{code}-*.yaml"), None)

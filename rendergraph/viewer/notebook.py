@@ -18,11 +18,8 @@ EXTRA = ("the viewer", "view", "starlette", "uvicorn", "websockets")
 class Viewer:
     """A page that is served until `close`, or until Python ends.
 
-    In a notebook it shows itself; elsewhere open `url` in a browser. It has a render process of its own, which shares
-    nothing with a `Session` of this process.
-
-    Attributes:
-        url: of the page; whoever has it may use the page.
+    In a notebook it shows itself; elsewhere open `url` in a browser: whoever has it may use the page. It has a render
+    process of its own, which shares nothing with a `Session` of this process.
     """
 
     def __init__(self, url: str, stop: Callable[[], None], height: int) -> None:
@@ -61,7 +58,7 @@ def view(
     """Serve a pipeline to a browser on this machine.
 
     Args:
-        pipeline: what to show: a pipeline, a shipped name, a file.
+        pipeline: a pipeline, a shipped name, a file.
         against: the pipeline to compare with.
         port: of the page's address; any that is free by default.
         device: GL device number.

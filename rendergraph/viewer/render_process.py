@@ -37,8 +37,7 @@ class RenderProcess:
     def ask(self, request: Request) -> Response:
         """Return the response to a request.
 
-        Raises:
-            RenderError: the process took too long, or died; the next request starts another.
+        A RenderError says that the process took too long or died; the next request starts another one.
         """
         with self._lock:
             child = self._running()

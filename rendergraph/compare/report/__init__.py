@@ -1,5 +1,5 @@
 """A comparison as one page that opens offline: pictures, tables and graphs, with nothing to fetch."""
 
-from rendergraph.compare.report.page import comparison_page, quality_svg, sweep_page
-
-__all__ = ["comparison_page", "quality_svg", "sweep_page"]
+from rendergraph.compare.report.page import comparison_page as comparison_page
+from rendergraph.compare.report.page import quality_svg as quality_svg
+from rendergraph.compare.report.page import sweep_page as sweep_page
