@@ -108,6 +108,7 @@ class Input(Port, frozen=True, eq=False):
         semantic: what it must mean; `Any` takes everything, and a `function` needs a `Signature`.
         size: `same` as the pass's target, or `any`.
         filter, wrap, compare, anisotropy: the sampler.
+        border: value outside the texture with `wrap="border"`; 1 by default, and 0 for comparisons.
         samples: `single`, `multi` (a multisampled texture) or `any`; a depth-test attachment takes any.
         optional: it may stay unconnected; the shader is then compiled without `HAS_<NAME>`.
         many: it takes a list.
@@ -122,6 +123,7 @@ class Input(Port, frozen=True, eq=False):
     wrap: Wrap = "clamp"
     compare: bool = False
     anisotropy: Positive = 1
+    border: Texel | None = None
     samples: Literal["single", "multi", "any"] = "single"
     optional: bool = False
     many: bool = False
@@ -136,7 +138,11 @@ class Input(Port, frozen=True, eq=False):
     @cached_property
     def sampler(self) -> Sampler | None:
         """How it is sampled; None if its filter is a rule."""
-        return None if callable(self.filter) else Sampler(self.filter, self.wrap, self.compare, self.anisotropy)
+        return None if callable(self.filter) else self.sampler_of(self.filter)
+
+    def sampler_of(self, filter: Filter) -> Sampler:
+        """The sampler with this filter."""
+        return Sampler(filter, self.wrap, self.compare, self.anisotropy, self.border)
 
     @cached_property
     def takes_scene(self) -> bool:
@@ -152,8 +158,8 @@ class WrittenPort(Port, frozen=True, eq=False):
         format: a name in `textures.FORMATS`; `rgba16f` by default.
         size: see `SizeRule`; the viewport by default.
         mips: levels; 0 means the full chain.
-        layers: array layers; a cube always has 6. By default an array has one for each light, if its `lights` are a
-            rule or those of the table of views it is drawn with, else 1.
+        layers: array layers, or the depth of a 3D texture; a cube always has 6. By default an array has one for each
+            light, if its `lights` are a rule or those of the table of views it is drawn with, else 1.
         samples: samples per texel; by default those of `like`, else of an input of the same size that is attached for
             the `depth_test`, else 1.
         bytes: size of a `buffer`.
@@ -167,7 +173,7 @@ class WrittenPort(Port, frozen=True, eq=False):
 
     semantic: Meaning | None = None
     like: str | None = None
-    kind: Literal["texture2d", "texture2d_array", "texture_cube", "buffer"] = "texture2d"
+    kind: Literal["texture2d", "texture2d_array", "texture3d", "texture_cube", "buffer"] = "texture2d"
     format: Ruled[FormatName] | None = None
     size: SizeRule | None = None
     mips: Ruled[Count] = 1

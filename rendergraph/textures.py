@@ -9,10 +9,12 @@ from typing import Literal
 
 from msgspec import Struct
 
-Kind = Literal["texture2d", "texture2d_array", "texture_cube", "buffer", "view", "function"]
+Kind = Literal["texture2d", "texture2d_array", "texture3d", "texture_cube", "buffer", "view", "function"]
 MOST_SIDE = 16_384
 """Largest width or height of a picture or texture."""
-TEXTURE_KINDS: frozenset[str] = frozenset({"texture2d", "texture2d_array", "texture_cube"})
+GLSL_SHAPES = {"texture2d": "2D", "texture2d_array": "2DArray", "texture3d": "3D", "texture_cube": "Cube"}
+"""Texture kinds to what GLSL appends to `sampler` and `image`."""
+TEXTURE_KINDS: frozenset[str] = frozenset(GLSL_SHAPES)
 
 Family = Literal["float", "unorm", "snorm", "uint", "int", "depth", "depth_stencil"]
 Filter = Literal["nearest", "linear", "trilinear"]
@@ -69,11 +71,17 @@ _FORMAT_ROWS: tuple[tuple[str, int, int, int, Family], ...] = (
     ("rg32f", 0x8230, 2, 8, "float"),
     ("rgba32f", 0x8814, 4, 16, "float"),
     ("r8ui", 0x8232, 1, 1, "uint"),
+    ("rg8ui", 0x8238, 2, 2, "uint"),
+    ("rgba8ui", 0x8D7C, 4, 4, "uint"),
     ("r16ui", 0x8234, 1, 2, "uint"),
+    ("rg16ui", 0x823A, 2, 4, "uint"),
+    ("rgba16ui", 0x8D76, 4, 8, "uint"),
     ("r32ui", 0x8236, 1, 4, "uint"),
     ("rg32ui", 0x823C, 2, 8, "uint"),
     ("rgba32ui", 0x8D70, 4, 16, "uint"),
     ("r32i", 0x8235, 1, 4, "int"),
+    ("rg32i", 0x823B, 2, 8, "int"),
+    ("rgba32i", 0x8D82, 4, 16, "int"),
     ("depth16", 0x81A5, 1, 2, "depth"),
     ("depth32f", 0x8CAC, 1, 4, "depth"),
     ("depth24_stencil8", 0x88F0, 1, 4, "depth_stencil"),
@@ -176,16 +184,17 @@ class Sampler(Struct, frozen=True):
     wrap: Wrap = "clamp"
     compare: bool = False
     anisotropy: int = 1
+    border: float | tuple[float, ...] | None = None
 
 
 class TextureDesc(Struct, frozen=True, gc=False):
     """What a texture is allocated from; equal descriptions can share one texture.
 
     Attributes:
-        kind: `texture2d`, `texture2d_array` or `texture_cube`; multisampled where `samples` is above 1.
+        kind: one of `TEXTURE_KINDS`; multisampled where `samples` is above 1.
         format: a name in `FORMATS`.
         width, height: texels of mip 0, each at least 1.
-        layers: array layers; 6 for a cube.
+        layers: array layers; 6 for a cube, the depth of mip 0 for a 3D texture.
         mips: levels of the mip chain, 1 for none.
         samples: samples per texel.
     """
@@ -206,18 +215,23 @@ class TextureDesc(Struct, frozen=True, gc=False):
     @property
     def bytes(self) -> int:
         """Bytes of all mips, layers and samples by formula; a driver may pad."""
-        texels = self.width * self.height
-        for mip in range(1, self.mips):
-            texels += max(1, self.width >> mip) * max(1, self.height >> mip)
-        return texels * self.layers * self.samples * FORMATS[self.format].bytes
+        texels = 0
+        for mip in range(self.mips):
+            width, height = self.mip_size(mip)
+            texels += width * height * self.mip_layers(mip)
+        return texels * self.samples * FORMATS[self.format].bytes
 
     def mip_size(self, mip: int) -> tuple[int, int]:
         """Width and height of one level."""
         return max(1, self.width >> mip), max(1, self.height >> mip)
 
+    def mip_layers(self, mip: int) -> int:
+        """Layers of one level, or its depth."""
+        return max(1, self.layers >> mip) if self.kind == "texture3d" else self.layers
+
     def lacks(self, mip: int | None, layer: int | None) -> str | None:
         """The mip or layer that it does not have, as the end of a sentence that names it; None where it has them."""
-        for name, number, count in (("mip", mip, self.mips), ("layer", layer, self.layers)):
+        for name, number, count in (("mip", mip, self.mips), ("layer", layer, self.mip_layers(mip or 0))):
             if number is not None and number >= count:
                 return f"has no {name} {number}; it has {f'0 to {count - 1}' if count > 1 else 'only 0'}"
         return None
@@ -235,6 +249,6 @@ class BufferDesc(Struct, frozen=True):
     bytes: int
 
 
-def full_mip_count(width: int, height: int) -> int:
-    """Levels down to 1×1."""
-    return max(width, height).bit_length()
+def full_mip_count(width: int, height: int, depth: int = 1) -> int:
+    """Levels down to a single texel."""
+    return max(width, height, depth).bit_length()

@@ -161,7 +161,7 @@ def _source(name: str, port: Input | InOut, folder: Path, samples: Samples) -> t
         meaning,
         kind=port.kind,
         format=format,
-        layers=layers if port.kind == "texture2d_array" else None,
+        layers=layers if port.kind in ("texture2d_array", "texture3d") else None,
         size=(24, 24) if port.kind == "texture_cube" else None,
         samples=samples,
         view="views",

@@ -16,19 +16,15 @@ from rendergraph.document import Value
 from rendergraph.errors import Place, Problem, shown_file, suggestion
 from rendergraph.glsl import SourceText, strip_comments
 from rendergraph.glsl.globals import Global, globals_of
-from rendergraph.textures import FORMATS, SEMANTICS, SIGNATURES, Semantic, Signature
+from rendergraph.textures import FORMATS, GLSL_SHAPES, SEMANTICS, SIGNATURES, Semantic, Signature
 from rendergraph.textures import Any as AnyTexture
 
-_SAMPLER = re.compile(r"[iu]?sampler(2D|2DArray|Cube|2DMS|2DMSArray)(Shadow)?\Z")
-_IMAGE = re.compile(r"[iu]?image(2D|2DArray)\Z")
-_KINDS = {
-    "2D": "texture2d",
-    "2DArray": "texture2d_array",
-    "Cube": "texture_cube",
-    "2DMS": "texture2d",
-    "2DMSArray": "texture2d_array",
-}
-_INTEGER_FORMATS = {"uint": "r32ui", "uvec2": "rg32ui", "uvec3": "rgba32ui", "uvec4": "rgba32ui", "int": "r32i"}
+_SAMPLER = re.compile(r"[iu]?sampler(2D|2DArray|3D|Cube|2DMS|2DMSArray)(Shadow)?\Z")
+_IMAGE = re.compile(r"[iu]?image(2D|2DArray|3D)\Z")
+_KINDS = {shape.replace("2D", "2DMS"): kind for kind, shape in GLSL_SHAPES.items()}
+_KINDS |= {shape: kind for kind, shape in GLSL_SHAPES.items()}
+_INTEGER_FORMATS = {"uint": "r32ui", "uvec2": "rg32ui", "uvec3": "rgba32ui", "uvec4": "rgba32ui"}
+_INTEGER_FORMATS |= {"int": "r32i", "ivec2": "rg32i", "ivec3": "rgba32i", "ivec4": "rgba32i"}
 _VARYINGS = ("v_uv",)
 """Varyings of the full-screen vertex shader."""
 MOST_NAMES = 256
@@ -156,6 +152,7 @@ class Entries:
             found = next((other for other in self.globals.declared if re.fullmatch(rf"{name}_\d+", other.name)), None)
         keys = ("doc", "optional", "many", "size", "filter", "wrap", "anisotropy", "group")
         options: dict[str, Any] = {key: entry[key].data for key in keys if key in entry}
+        options |= {"border": _texel(entry["border"])} if "border" in entry else {}
         if found is not None and "kind" in entry:
             kind, declared = entry["kind"].data, f"{found.storage} {found.type} {name}".replace("  ", " ")
             text = f"the header has '{name}' as a {kind}, but the shader declares '{declared}'; leave one of them out"
@@ -237,8 +234,7 @@ class Entries:
         if "size" in entry:
             options["size"] = _size_rule(entry["size"])
         if "clear" in entry:
-            clear = entry["clear"].plain()
-            options["clear"] = tuple(map(float, clear)) if isinstance(clear, list) else float(clear)
+            options["clear"] = _texel(entry["clear"])
         if options.get("kind") == "buffer" and "bytes" not in options:
             text = f"the buffer '{name}' has no size; add outputs: {{{name}: {{bytes: N}}}} to the header"
             self.report("RG441", text, found)
@@ -256,12 +252,9 @@ class Entries:
             if texel and "like" not in entry:
                 options["format"] = texel
         elif found.storage == "out" and not found.array:
-            integer = found.type.startswith(("i", "u"))
+            integer = found.type in _INTEGER_FORMATS
             if integer and "format" not in entry and "like" not in entry:
-                options["format"] = _INTEGER_FORMATS.get(found.type)
-                if options["format"] is None:
-                    text = f"no format holds the {found.type} of output '{name}'; use uvec4 or int"
-                    self.report("RG441", text, found)
+                options["format"] = _INTEGER_FORMATS[found.type]
             elif not integer and found.type not in ("float", "vec2", "vec3", "vec4"):
                 text = f"output '{name}': expected float, vec2 to vec4, uint or int, got {found.type}"
                 self.report("RG441", text, found)
@@ -397,3 +390,8 @@ def _size_rule(value: Value) -> SizeRule:
         return max(1, math.ceil(width * scale - 1e-9)), max(1, math.ceil(height * scale - 1e-9))
 
     return rule
+
+
+def _texel(value: Value) -> float | tuple[float, ...]:
+    plain = value.plain()
+    return tuple(map(float, plain)) if isinstance(plain, list) else float(plain)

@@ -117,6 +117,7 @@ INPUT = Table(
         Key("filter", choice(*get_args(Filter)), "How it is read between texels.", "nearest"),
         Key("wrap", choice(*get_args(Wrap)), "How it is read beyond its edges.", "clamp"),
         Key("anisotropy", whole(1, 16), "Samples where it is seen at an angle.", 1),
+        Key("border", NUMBER | vector(4), "What is read beyond its edges with `wrap: border`.", 1),
         Key("group", word(_NAME, "a word"), "The group it is connected with."),
     ),
 )

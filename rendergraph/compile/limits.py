@@ -42,9 +42,10 @@ def _excesses(
     limits = device.limits
     for name, resource in plan.resources.items():
         if isinstance(desc := resource.desc, TextureDesc):
+            is_3d = desc.kind == "texture3d"
             for words, value, limit in (
-                (f"is {desc.width}×{desc.height}", max(desc.size), "texture_size"),
-                (f"has {desc.layers} layers", desc.layers, "layers"),
+                (f"is {desc.width}×{desc.height}", max(desc.size), "depth" if is_3d else "texture_size"),
+                (f"has {desc.layers} layers", desc.layers, "depth" if is_3d else "layers"),
             ):
                 if value > limits[limit]:
                     yield Problem("RG435", f"'{name}' {words}, which is more than this device's {limits[limit]}")

@@ -50,6 +50,8 @@ def format_texture(desc: TextureDesc) -> str:
     text = f"{desc.format} {desc.width}×{desc.height}"
     if desc.kind == "texture_cube":
         text += " cube"
+    elif desc.kind == "texture3d":
+        text += f"×{desc.layers}"
     elif desc.kind == "texture2d_array":
         text += f" {desc.layers} layer{'s' if desc.layers != 1 else ''}"
     if desc.mips > 1:

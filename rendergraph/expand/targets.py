@@ -66,7 +66,7 @@ def attachment_mismatch(
             continue
         depths += [touched.resource] if FORMATS[desc.format].is_depth else []
         layered = touched.layer is None and desc.kind != "texture2d"
-        extent = (*desc.mip_size(touched.mip or 0), desc.samples, desc.layers if layered else 0)
+        extent = (*desc.mip_size(touched.mip or 0), desc.samples, desc.mip_layers(touched.mip or 0) if layered else 0)
         name = touched.resource + ("" if touched.mip is None else f" mip {touched.mip}")
         if first is None:
             first = name, extent

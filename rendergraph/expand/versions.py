@@ -260,6 +260,10 @@ class _VersionAssignment:
             text = feedback(request, write, reads)
             if text is not None:
                 raise self._refused(recording, request, "RG422", text)
+        for read in reads:
+            if read.use == "sample" and read.layer is not None and self._is_3d(read.resource):
+                text = f"it samples a slice of the 3D texture '{read.resource}'; sample all of it as a sampler3D"
+                raise self._refused(recording, request, "RG420", text)
         text = undefined_destination(request, writes)
         if text is not None:
             raise self._refused(recording, request, "RG429", text)
@@ -274,6 +278,10 @@ class _VersionAssignment:
                 text = image_refusal(request.kind, touched, self.resources.get(touched.resource))
                 if text is not None:
                     raise self._refused(recording, request, "RG426", text)
+
+    def _is_3d(self, resource: str) -> bool:
+        desc = self.resources[resource].desc if resource in self.resources else None
+        return isinstance(desc, TextureDesc) and desc.kind == "texture3d"
 
     def _refused(self, recording: Recording, request: StepRequest, code: str, text: str) -> InputError:
         node = recording.node

@@ -243,6 +243,7 @@ def _wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
         "uniform_bindings": raw.integer(0x8A2F),
         "texture_size": raw.integer(0x0D33),
         "layers": raw.integer(0x88FF),
+        "depth": raw.integer(0x8073),
         "samples": raw.integer(0x910E),  # of colour textures
         "depth_samples": raw.integer(0x910F),
         "integer_samples": raw.integer(0x9110),

@@ -85,7 +85,8 @@ def _block(device: Device, vulkan: Vulkan, descs: Sequence[TextureDesc]) -> Memo
 _FORMATS = {
     "r8": 9, "rg8": 16, "rgba8": 37, "srgb8_a8": 43, "r16": 70, "rg16": 77, "rgba16": 91, "rgb10_a2": 64,
     "rgba16_snorm": 92, "r16f": 76, "rg16f": 83, "rgba16f": 97, "r11f_g11f_b10f": 122, "r32f": 100, "rg32f": 103,
-    "rgba32f": 109, "r8ui": 13, "r16ui": 74, "r32ui": 98, "rg32ui": 101, "rgba32ui": 107, "r32i": 99,
+    "rgba32f": 109, "r8ui": 13, "rg8ui": 20, "rgba8ui": 41, "r16ui": 74, "rg16ui": 81, "rgba16ui": 95, "r32ui": 98,
+    "rg32ui": 101, "rgba32ui": 107, "r32i": 99, "rg32i": 102, "rgba32i": 108,
     "depth16": 124, "depth32f": 126, "depth24_stencil8": 129, "depth32f_stencil8": 130,
 }  # fmt: skip
 _OPAQUE_FD = 1
@@ -107,8 +108,9 @@ class Vulkan:
         uses = _DEPTH_USES if FORMATS[desc.format].is_depth else _COLOR_USES
         external = _packed("@I P I", 1000072001, 0, _OPAQUE_FD)
         flags = 0x10 if desc.kind == "texture_cube" else 0
-        size = (desc.width, desc.height, 1, desc.mips, desc.layers)
-        asked = (14, _address(external), flags, 1, _FORMATS[desc.format], *size, desc.samples, 0, uses, 0, 0, 0, 0)
+        kind, depth, layers = (2, desc.layers, 1) if desc.kind == "texture3d" else (1, 1, desc.layers)
+        size = (desc.width, desc.height, depth, desc.mips, layers)
+        asked = (14, _address(external), flags, kind, _FORMATS[desc.format], *size, desc.samples, 0, uses, 0, 0, 0, 0)
         image, found = ctypes.c_uint64(), (ctypes.c_uint64 * 3)()
         self._call("vkCreateImage", self._device, _packed("@I P 13I P I", *asked), None, ctypes.byref(image))
         self._library.vkGetImageMemoryRequirements(self._device, image, found)

@@ -22,7 +22,7 @@ from rendergraph.textures import FORMATS, Sampler, TextureDesc
 
 MOST_READ = 1 << 30  # bytes read back at once
 
-_TARGETS = {"texture2d": 0x0DE1, "texture2d_array": 0x8C1A, "texture_cube": 0x8513}
+_TARGETS = {"texture2d": 0x0DE1, "texture2d_array": 0x8C1A, "texture3d": 0x806F, "texture_cube": 0x8513}
 _MULTISAMPLE_TARGETS = {"texture2d": 0x9100, "texture2d_array": 0x9102}
 _CHANNELS = {1: 0x1903, 2: 0x8227, 3: 0x1907, 4: 0x1908}
 _INTEGER_CHANNELS = {1: 0x8D94, 2: 0x8228, 4: 0x8D99}
@@ -48,7 +48,7 @@ def create(device: Device, desc: TextureDesc, label: str = "", *, memory: int | 
     raw.error()
     target, gl_format = target_of(desc), FORMATS[desc.format].gl
     glo = raw.make("glCreateTextures", target)
-    layered = desc.kind == "texture2d_array"
+    layered = desc.kind in ("texture2d_array", "texture3d")
     size = (desc.width, desc.height, *((desc.layers,) if layered else ()))
     store = "glTextureStorage" + ("Mem" if memory is not None else "") + ("3D" if layered else "2D")
     at = (memory, 0) if memory is not None else ()
@@ -80,16 +80,15 @@ def view(
         format=format or desc.format,
         width=desc.mip_size(mip or 0)[0],
         height=desc.mip_size(mip or 0)[1],
-        layers=desc.layers if layer is None else 1,
+        layers=desc.mip_layers(mip or 0) if layer is None else 1,
         mips=desc.mips if mip is None else 1,
         samples=desc.samples,
     )
     raw = device.raw
     glo = raw.make("glGenTextures")
     target = target_of(viewed)
-    raw.glTextureView(
-        glo, target, texture.glo, FORMATS[viewed.format].gl, mip or 0, viewed.mips, layer or 0, max(1, viewed.layers)
-    )
+    layers = 1 if viewed.kind == "texture3d" else max(1, viewed.layers)
+    raw.glTextureView(glo, target, texture.glo, FORMATS[viewed.format].gl, mip or 0, viewed.mips, layer or 0, layers)
     error = raw.error()
     if error:
         raise RenderError(Problem("RG612", f"the driver refused a texture view of {desc} as {viewed} ({error})"))
@@ -108,7 +107,7 @@ def copies(device: Device, source: GpuTexture, target: GpuTexture) -> list[Calla
             device.raw.glCopyImageSubData,
             *(source.glo, source.target, mip, 0, 0, 0),
             *(target.glo, target.target, mip, 0, 0, 0),
-            *(*source.desc.mip_size(mip), source.desc.layers),
+            *(*source.desc.mip_size(mip), source.desc.mip_layers(mip)),
         )
         for mip in range(source.desc.mips)
     ]
@@ -145,7 +144,7 @@ def read(
             return read(device, resolved, layer=layer, stencil=stencil)
         finally:
             delete(device, resolved)
-    first, layers = (0, desc.layers) if layer is None else (layer, 1)
+    first, layers = (0, desc.mip_layers(mip)) if layer is None else (layer, 1)
     width, height = desc.mip_size(mip)
     gl_format, gl_type, dtype, channels = transfer_format(desc.format)
     texels: npt.NDArray[Any] = np.empty((layers, height, width, channels), dtype)
@@ -215,13 +214,14 @@ def upload(device: Device, texture: GpuTexture, texels: npt.NDArray[Any], *, mip
     width, height = desc.mip_size(mip)
     gl_format, gl_type, dtype, channels = transfer_format(desc.format)
     data = np.ascontiguousarray(texels, dtype)
-    assert data.size == width * height * desc.layers * channels, (data.shape, desc)
+    layers = desc.mip_layers(mip)
+    assert data.size == width * height * layers * channels, (data.shape, desc)
     device.raw.glPixelStorei(0x0CF5, 1)
     if desc.kind == "texture2d":
         device.raw.glTextureSubImage2D(texture.glo, mip, 0, 0, width, height, gl_format, gl_type, data.ctypes.data)
     else:
         device.raw.glTextureSubImage3D(
-            texture.glo, mip, 0, 0, 0, width, height, desc.layers, gl_format, gl_type, data.ctypes.data
+            texture.glo, mip, 0, 0, 0, width, height, layers, gl_format, gl_type, data.ctypes.data
         )
 
 
@@ -265,11 +265,10 @@ class Clear:
             values[:3] = np.where(color <= 0.0031308, 12.92 * color, 1.055 * color ** (1 / 2.4) - 0.055)
         self._values = values  # kept alive: the calls below hold its address
         self._clear = device.raw.glClearTexSubImage
-        layers = (0, desc.layers) if layer is None else (layer, 1)
         self._calls = []
         for level in range(desc.mips) if mip is None else (mip,):
-            (width, height), (first, count) = desc.mip_size(level), layers
-            box = (level, 0, 0, first, width, height, count)
+            first, count = (0, desc.mip_layers(level)) if layer is None else (layer, 1)
+            box = (level, 0, 0, first, *desc.mip_size(level), count)
             self._calls.append((texture.glo, *box, gl_format, gl_type, values.ctypes.data))
 
     def __call__(self) -> None:
@@ -295,11 +294,14 @@ _WRAPS = {"clamp": 0x812F, "repeat": 0x2901, "mirror": 0x8370, "border": 0x812D}
 
 
 def create_sampler(device: Device, sampler: Sampler) -> int:
-    """Create a sampler; its border is 1 in every channel (open and lit), and 0 for comparisons (no occluder)."""
+    """Create a sampler; its border is by default 1 in every channel (open and lit), and 0 for comparisons."""
     is_trilinear = sampler.filter == "trilinear"
     filters = ("linear_mipmap_linear", "linear") if is_trilinear else (sampler.filter, sampler.filter)
     wraps = sampler.wrap, sampler.wrap
-    return create_gl_sampler(device, *filters, *wraps, compare=sampler.compare, anisotropy=sampler.anisotropy)
+    border = float(not sampler.compare) if sampler.border is None else sampler.border
+    return create_gl_sampler(
+        device, *filters, *wraps, compare=sampler.compare, anisotropy=sampler.anisotropy, border=border
+    )
 
 
 def create_gl_sampler(
@@ -311,6 +313,7 @@ def create_gl_sampler(
     *,
     compare: bool = False,
     anisotropy: int = 1,
+    border: float | tuple[float, ...] = 1.0,
 ) -> int:
     raw = device.raw
     glo = raw.make("glCreateSamplers")
@@ -318,8 +321,8 @@ def create_gl_sampler(
     raw.glSamplerParameteri(glo, 0x2800, _FILTERS[mag_filter])
     raw.glSamplerParameteri(glo, 0x2802, _WRAPS[wrap_s])
     raw.glSamplerParameteri(glo, 0x2803, _WRAPS[wrap_t])
-    border = (ctypes.c_float * 4)(*[0.0 if compare else 1.0] * 4)
-    raw.glSamplerParameterfv(glo, 0x1004, ctypes.byref(border))
+    raw.glSamplerParameteri(glo, 0x8072, _WRAPS[wrap_t])  # along the depth of 3D textures
+    raw.glSamplerParameterfv(glo, 0x1004, (ctypes.c_float * 4)(*texel(border, 4, np.float32)))
     if compare:
         raw.glSamplerParameteri(glo, 0x884C, 0x884E)  # COMPARE_MODE, COMPARE_REF_TO_TEXTURE
         raw.glSamplerParameteri(glo, 0x884D, 0x0206)  # COMPARE_FUNC, GEQUAL: 1 if not farther than the texel

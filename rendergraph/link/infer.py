@@ -145,7 +145,7 @@ class TextureInference:
                 smooth = self._checked_value(end, "filter", port.filter, Filter)
             except _Unknown:
                 smooth = "nearest"
-            self._samplers[end] = Sampler(smooth, port.wrap, port.compare, port.anisotropy)
+            self._samplers[end] = port.sampler_of(smooth)
         return self._samplers[end]
 
     def clear(self, draft: UnlinkedNode, port: WrittenPort) -> Texel | None:
@@ -275,17 +275,17 @@ class TextureInference:
         if layers is None:
             layers = like.layers if like is not None else usual
         layers = 6 if kind == "texture_cube" else layers
-        full = full_mip_count(*size)
+        full = full_mip_count(*size, layers if kind == "texture3d" else 1)
         mips = self._checked_value(end, "mips", port.mips, Count) or full
         samples = self._checked_value(end, "samples", port.samples, _SAMPLES)
         if samples is None:
-            samples = 1 if mips > 1 or kind == "texture_cube" else self._samples_of(draft, like, size)
+            samples = 1 if mips > 1 or kind in ("texture3d", "texture_cube") else self._samples_of(draft, like, size)
         if kind == "texture2d" and layers != 1:
             self._stop(end, "RG208", f"a {kind} cannot have {layers} layers")
         if mips > full:
             self._stop(end, "RG208", f"a texture of {size[0]}×{size[1]} has 1 to {full} mips, not {mips}")
-        if samples > 1 and (mips > 1 or kind == "texture_cube"):
-            self._stop(end, "RG208", f"a texture cannot have {samples} samples a texel with mips or in a cube")
+        if samples > 1 and (mips > 1 or kind in ("texture3d", "texture_cube")):
+            self._stop(end, "RG208", f"a texture cannot have {samples} samples a texel with mips, in 3D or in a cube")
         return TextureDesc(kind, name, *size, layers=layers, mips=mips, samples=samples)
 
     def _samples_of(self, draft: UnlinkedNode, like: TextureDesc | None, size: tuple[int, int]) -> int:

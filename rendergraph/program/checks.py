@@ -16,7 +16,7 @@ from rendergraph.glsl.reachable import reachable_names
 from rendergraph.program.text import StageText, prefix, stage_texts, text_key
 from rendergraph.stamps import FileCache
 from rendergraph.steps import Read, Resource, Step
-from rendergraph.textures import FORMATS, TextureDesc
+from rendergraph.textures import FORMATS, GLSL_SHAPES, TextureDesc
 
 _PASSED: FileCache[tuple[Problem, ...]] = FileCache()
 """The warnings about texts in which nothing was wrong."""
@@ -34,7 +34,6 @@ _MOVING = {
 _SAMPLER = r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?([iu]?sampler\w+)\s+([^;]+);"
 _NAME = r"[A-Za-z_]\w*"
 _BRACES = r"(?:\A|(?<=[;{}]))([^;{}]*)\{([^{}]*)\}(?=\s*([A-Za-z_]\w*)?)"
-_SAMPLERS = {"texture2d": "sampler2D", "texture2d_array": "sampler2DArray", "texture_cube": "samplerCube"}
 
 
 def check_texts(
@@ -83,7 +82,7 @@ def sampler_of(read: Read, resource: Resource) -> str:
     """Return the GLSL sampler type of a read: `usampler2D`, `sampler2DArrayShadow`, `sampler2DMS`."""
     assert isinstance(resource.desc, TextureDesc)
     whole = {"uint": "u", "int": "i"}.get(FORMATS[resource.desc.format].family, "")
-    name = _SAMPLERS[read.kind]
+    name = f"sampler{GLSL_SHAPES[read.kind]}"
     if resource.desc.samples > 1:
         name = name.replace("2D", "2DMS")
     return whole + name + ("Shadow" if read.sampler.compare else "")

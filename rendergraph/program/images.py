@@ -13,15 +13,15 @@ from msgspec.structs import replace
 from rendergraph.errors import InputError, Problem
 from rendergraph.glsl.source import SourceText
 from rendergraph.steps import Read, Resource, Step, Write
-from rendergraph.textures import FORMATS, TextureDesc
+from rendergraph.textures import FORMATS, GLSL_SHAPES, TextureDesc
 
 _MEMORY = r"(?:(?:coherent|volatile|restrict|readonly|writeonly|highp|mediump|lowp)\s+)*"
 _IMAGE = re.compile(
     rf"(?P<layout>layout\s*\((?P<inside>[^)]*)\)\s*)?(?P<rest>{_MEMORY}uniform\s+{_MEMORY}"
     rf"(?P<type>[iu]?image\w+)\s+(?P<name>[A-Za-z_]\w*))"
 )
-_OTHER_FORMATS = """rg16_snorm r16_snorm rgba8_snorm rg8_snorm r8_snorm rgba32i rgba16i rgba8i rg32i rg16i rg8i r16i
-r8i rgba16ui rgb10_a2ui rgba8ui rg16ui rg8ui"""
+_OTHER_FORMATS = """rg16_snorm r16_snorm rgba8_snorm rg8_snorm r8_snorm rgba16i rgba8i rg16i rg8i r16i r8i
+rgb10_a2ui"""
 _LAYOUT_FORMATS = {*FORMATS, *_OTHER_FORMATS.split()}
 
 
@@ -66,8 +66,7 @@ def _stated(match: re.Match[str]) -> str | None:
 
 def _mismatch(match: re.Match[str], use: Read | Write, desc: TextureDesc) -> str | None:
     letter = {"uint": "u", "int": "i"}.get(FORMATS[desc.format].family, "")
-    shape = {"texture2d_array": "2DArray", "texture_cube": "Cube"}.get(desc.kind, "2D")
-    wanted = f"{letter}image{'2D' if use.layer is not None else shape}"
+    wanted = f"{letter}image{'2D' if use.layer is not None else GLSL_SHAPES[desc.kind]}"
     name = match["name"]
     if match["type"] != wanted:
         return f"image '{name}' is an {match['type']}, but '{use.resource}' is {desc.format}, which takes {wanted}"

@@ -18,11 +18,9 @@ from rendergraph.program.text import StageText, prefix, screen_reads, signatures
 from rendergraph.resources import folder
 from rendergraph.scene.pack import SLOTS
 from rendergraph.steps import Read, Resource, Step
-from rendergraph.textures import FORMATS, TextureDesc
+from rendergraph.textures import FORMATS, GLSL_SHAPES, TextureDesc
 
 _BLOCK = re.compile(r"\b(?:uniform|buffer)\s+(\w+)\s*\{([^{}]*)\}")
-_KINDS = {"texture2d": "2D", "texture2d_array": "2DArray", "texture_cube": "Cube"}
-
 
 SECTIONS = ("textures", "uniforms", "blocks", "macros", "functions", "includes", "attributes", "varyings", "outputs")
 """In the order of printing."""
@@ -81,7 +79,7 @@ class _Scope:
             if not isinstance(desc, TextureDesc) or read.use not in ("sample", "image"):
                 continue
             letter = {"int": "i", "uint": "u"}.get(FORMATS[desc.format].family, "")
-            kind = _KINDS.get(read.kind, "2D") + ("MS" if desc.samples > 1 else "")
+            kind = GLSL_SHAPES[read.kind] + ("MS" if desc.samples > 1 else "")
             word = "image" if read.use == "image" else "sampler"
             shadow = "Shadow" if read.sampler.compare and read.use == "sample" else ""
             yield InScope(

@@ -25,7 +25,7 @@ class OutputInfo(Struct, frozen=True):
         port: `node.port`.
         semantic: the semantic's name; `stencil` if that was tapped.
         format: the texture format.
-        kind: `texture2d`, `texture2d_array`, `texture_cube` or `buffer`.
+        kind: a texture kind or `buffer`.
         encoding: `linear`, `display` or None.
         channels: channel names, as in an EXR file.
     """

@@ -428,4 +428,4 @@ def _caller() -> tuple[str, int] | None:
 
 
 def _texels(desc: TextureDesc, part: Part) -> tuple[int, int, int]:
-    return *desc.mip_size(part.mip or 0), 1 if part.layer is not None else desc.layers
+    return *desc.mip_size(part.mip or 0), 1 if part.layer is not None else desc.mip_layers(part.mip or 0)

@@ -1,4 +1,5 @@
 uniform samplerCube sky;
+uniform sampler3D fog;
 uniform sampler2DArray layers;
 uniform sampler2DMS samples;
 #ifdef HAS_MANY
@@ -18,7 +19,7 @@ void main() {
     vec3 position = world_position(depth_views[0], v_uv, texelFetch(depth, p, 0).r);
     result = gain * vec4(tint, 1.0) * texture(sky, vec3(v_uv, 1.0)) + texelFetch(layers, ivec3(p, 1), 0) + texelFetch(samples, p, 2);
     result.rgb += texture(shadow_map, vec4(v_uv, 0.0, 0.5)) + float(all_words[3]) + 0.01 * position;
-    result.rgb *= weight(v_uv, 1);
+    result.rgb *= weight(v_uv, 1) + texture(fog, vec3(v_uv, 0.5)).rgb;
 #ifdef HAS_MANY
     result += texelFetch(many_0, p, 0);
 #endif

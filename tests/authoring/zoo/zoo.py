@@ -36,6 +36,7 @@ class Zoo(Node):
     """One of each."""
 
     sky = Input(Radiance, kind="texture_cube", size="any", filter="linear", doc="A cube.")
+    fog = Input(Radiance, kind="texture3d", size="any", filter="linear", doc="A volume.")
     layers = Input(AnyTexel, kind="texture2d_array", doc="An array.")
     samples = Input(Radiance, samples="multi", doc="Multisampled.")
     many = Input(Radiance, many=True, optional=True, doc="Several.")
@@ -62,6 +63,7 @@ class Zoo(Node):
             "zoo.frag",
             out={"result": self.result, "past": self.past},
             sky=self.sky,
+            fog=self.fog,
             layers=self.layers,
             samples=self.samples,
             many=self.many,
