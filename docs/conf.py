@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -56,7 +57,37 @@ def _generate(app: Sphinx, config: Config) -> None:
     generate(HERE / "reference" / "generated", pictures=config.pictures)
 
 
+# The reference is generated, so a forge has none of its pages: links there lead to what a page is generated from.
+_GENERATED = (
+    (r"rendergraph/errors/(RG\d+)-[\w-]+\.yaml", r"errors/\1.md"),
+    (r"rendergraph/errors/", "errors/index.md"),
+    (r"rendergraph/api/__init__\.py", "node-api.md"),
+    (r"rendergraph/api/projection\.py", "views.md"),
+    (r"nodes/(?:\w+/)*_\w+\.py", "nodes/bases.md"),
+    (r"nodes/(?:\w+/)*(\w+)\.py", r"nodes/\1.md"),
+    (r"nodes/", "nodes/index.md"),
+    (r"pipelines/", "pipelines.md"),
+)
+
+
+def _link_generated(app: Sphinx, docname: str, source: list[str]) -> None:
+    """Lead links to the reference's pages, and put includes, which are comments on a forge, in their places."""
+    home = "../" * docname.count("/") + "reference/generated/"
+
+    def linked(found: re.Match[str]) -> str:
+        for pattern, page in _GENERATED:
+            if match := re.fullmatch(pattern, found[1]):
+                return f"]({home}{match.expand(page)})"
+        return found[0]
+
+    include = "```{include} \\1\n```"
+    text = re.sub(r"^<!-- \{include\} (\S+) -->$", include, source[0], flags=re.MULTILINE)
+    text = re.sub(r"^\[[^\]]*\]\((\S+)\)<!-- \{include\} -->$", include, text, flags=re.MULTILINE)
+    source[0] = re.sub(r"\]\((?:\.\./)+((?:rendergraph|nodes|pipelines)/[^)\s]*)\)", linked, text)
+
+
 def setup(app: Sphinx) -> None:
     """Sphinx's hook."""
     app.add_config_value("pictures", True, "env", bool, "Draw the pictures of the reference, which takes minutes.")
     app.connect("config-inited", _generate)
+    app.connect("source-read", _link_generated)
