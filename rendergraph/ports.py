@@ -73,6 +73,10 @@ class Port(Struct, frozen=True, eq=False, dict=True):
         """The texture attached read-only for the depth test, of an input that other steps sample."""
         return Part(self, use="depth_test")
 
+    def stored(self) -> Part:
+        """The whole texture, bound as an image of a drawing step, for loads, stores and atomics."""
+        return self.whole.stored()
+
 
 class Part(Struct, frozen=True):
     """A port's texture, or one mip or layer of it; `previous` is last frame's value, `link` the position in a list."""
@@ -82,7 +86,7 @@ class Part(Struct, frozen=True):
     layer: Count | None = None
     previous: bool = False
     sampler: Sampler | None = None
-    use: Literal["depth_test"] | None = None
+    use: Literal["depth_test", "image"] | None = None
     link: Count | None = None
 
     def __post_init__(self) -> None:
@@ -99,6 +103,10 @@ class Part(Struct, frozen=True):
     def sampled(self, filter: Filter = "nearest", wrap: Wrap = "clamp", compare: bool = False) -> Part:
         """The same part, read with this sampler."""
         return replace(self, sampler=validated(Sampler(filter, wrap, compare), "sampled"))
+
+    def stored(self) -> Part:
+        """The same part, bound as an image."""
+        return replace(self, use="image")
 
 
 class Input(Port, frozen=True, eq=False):

@@ -170,7 +170,7 @@ class Entries:
         elif image := _IMAGE.match(found.type):
             options |= {"kind": _KINDS[image[1]], "use": "image"}
             if self.file.suffix == ".frag" and "readonly" not in found.qualifiers:
-                text = f"a full-screen pass stores no images; declare '{name}' readonly, or an out"
+                text = f"a .frag file alone stores no images; declare '{name}' readonly, or write the node in Python"
                 self.report("RG441", text, found)
         else:
             text = f"the header has input '{name}', but the shader declares '{found.storage} {found.type} {name}'"

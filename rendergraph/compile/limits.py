@@ -60,7 +60,7 @@ def _excesses(
     for step in plan.schedule.steps:
         uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
         buffers = {use.name for use in (*step.all_reads, *uses) if use.use == "buffer"}
-        images = sum(use.use == "image" for use in uses) if step.kind == "compute" else 0
+        images = sum(use.use == "image" for use in uses) if step.shaders else 0
         for words, value, most in (
             ("colour targets", sum(write.use == "color" for write in step.writes), limits["color_targets"]),
             ("buffers", len(buffers), limits["storage_bindings"] - fixed_blocks),

@@ -226,10 +226,13 @@ class Memory(Struct, eq=False, dict=True):
         if key in self._framebuffers:
             return self._framebuffers[key]
         stencil = depth is not None and FORMATS[depth.texture.desc.format].family == "depth_stencil"
-        made = self.device.ctx.framebuffer(
-            [self._dummy(number, depth=False) for number in range(len(colors))],
-            self._dummy(0, depth=True) if depth is not None else None,
-        )
+        if colors or depth is not None:
+            made = self.device.ctx.framebuffer(
+                [self._dummy(number, depth=False) for number in range(len(colors))],
+                self._dummy(0, depth=True) if depth is not None else None,
+            )
+        else:  # a step that only stores
+            made = self.device.ctx.empty_framebuffer(size)
         raw = self.device.raw
         for number, color in enumerate(colors):
             self._attach(made.glo, 0x8CE0 + number, color)

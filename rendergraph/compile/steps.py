@@ -130,6 +130,11 @@ class _Compiler(Struct, eq=False, dict=True):
             "compute": self._compute,
         }
         drawing.get(step.kind, self._transfer)(step, compiled, parity)
+        if step.shaders:
+            calls, units = image_calls(self.device, self.memory, step, parity)
+            compiled.before[:0] = calls  # clears may bind a framebuffer of their own
+            for draw in compiled.all_draws:
+                draw.uniforms |= {name: unit for name, unit in units.items() if name in draw.program.uniforms}
         self._watch(step, compiled)
         stored = [write for write in step.writes if write.use in ("buffer", "image") and step.kind != "clear"]
         compiled.before += [
@@ -243,9 +248,6 @@ class _Compiler(Struct, eq=False, dict=True):
 
     def _compute(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         program, binds, uniforms = self._program(step, parity, {})
-        calls, units = image_calls(self.device, self.memory, step, parity)
-        compiled.before += calls
-        uniforms |= {name: unit for name, unit in units.items() if name in program.uniforms}
         call = partial(program.object.run, *groups_of(step, program.local_size, self.device.limits))
         compiled.draws.append(Draw(program, uniforms, None, call, binds))
 

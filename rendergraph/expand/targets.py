@@ -44,7 +44,8 @@ def target_size(
     resources: Mapping[str, Resource], writes: Sequence[Write], reads: Iterable[Read]
 ) -> tuple[tuple[int, int], int]:
     """Return ((width, height), samples) of a step's targets."""
-    attached: Iterable[Read | Write] = chain(writes, (read for read in reads if read.use == "depth_test"))
+    drawn_to = [write for write in writes if write.use in ("color", "depth")]
+    attached: Iterable[Read | Write] = chain(drawn_to, (r for r in reads if r.use == "depth_test"), writes)
     for touched in attached:
         desc = resources[touched.resource].desc
         if isinstance(desc, TextureDesc):
@@ -102,19 +103,17 @@ def undefined_destination(request: StepRequest, writes: Iterable[Write]) -> str 
     return None
 
 
-def image_refusal(kind: str, touched: Read | Write, resource: Resource | None) -> str | None:
+def image_refusal(touched: Read | Write, resource: Resource | None) -> str | None:
     """Explain why a texture cannot be stored to or loaded from as an image."""
     desc = resource.desc if resource is not None else None
     if not isinstance(desc, TextureDesc):
         return None
     word = "write" if isinstance(touched, Write) else "load"
-    if kind != "compute":
-        return f"it would {word} '{touched.resource}' as an image, which only compute steps do; sample it instead"
     fmt = FORMATS[desc.format]
     if not (fmt.is_depth or fmt.srgb or desc.samples > 1):
         return None
     what = f"{desc.samples} samples a texel" if desc.samples > 1 else f"the format {desc.format}"
-    return f"a compute step cannot {word} '{touched.resource}', which has {what}"
+    return f"it cannot {word} '{touched.resource}' as an image, as it has {what}"
 
 
 _Extent = tuple[int, int, int, int]  # width, height, samples, layers

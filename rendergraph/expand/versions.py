@@ -187,7 +187,7 @@ class _VersionAssignment:
             ]
         own = Endpoint(recording.node.id, port.name, part.previous)
         resource, _ = self.final[own.now]
-        return [self._read(name, own, part, part.sampler or _PLAIN, "sample", self.version[resource])]
+        return [self._read(name, own, part, part.sampler or _PLAIN, part.use or "sample", self.version[resource])]
 
     def _read(
         self, name: str, end: Endpoint, part: Part, sampler: Sampler, use: Use, version: int | None = None
@@ -235,7 +235,7 @@ class _VersionAssignment:
         use = "color"
         if isinstance(desc, BufferDesc):
             use = "buffer"
-        elif request.kind == "compute":
+        elif request.kind == "compute" or part.use == "image":
             use = "image"
         elif isinstance(desc, TextureDesc) and FORMATS[desc.format].is_depth:
             use = "depth"
@@ -275,7 +275,7 @@ class _VersionAssignment:
                 raise self._refused(recording, request, "RG425", text)
         for touched in touching if "image" in uses else ():
             if touched.use == "image":
-                text = image_refusal(request.kind, touched, self.resources.get(touched.resource))
+                text = image_refusal(touched, self.resources.get(touched.resource))
                 if text is not None:
                     raise self._refused(recording, request, "RG426", text)
 

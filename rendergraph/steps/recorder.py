@@ -78,11 +78,12 @@ class Steps:
     Textures that a step reads are given by their name in the shader (`source=self.source`); a step that names none
     reads every connected input under its own name. Other keyword values become the step's uniforms. `out` is a port, a
     part, or a mapping from the shader's output names; by default the step writes every used output of the node. A
-    texture with a depth format is attached as depth. Arguments that are None, such as a port that a subclass drops, are
-    ignored. A step with a `region` number is drawn in the rectangle that `update` sets for that number
-    (`Frame.set_region`), until then everywhere. A `label` is the step's name in plans and `bench --steps`, beside its
-    node and number. A step that draws nothing where an earlier one of the node drew nothing names that one's label
-    (`if_drawn`): the device then skips it, without the CPU waiting for the answer.
+    texture with a depth format is attached as depth. In drawing steps `port.stored()` binds a texture as an image, and
+    a buffer is bound as a storage block. Arguments that are None, such as a port that a subclass drops, are ignored. A
+    step with a `region` number is drawn in the rectangle that `update` sets for that number (`Frame.set_region`), until
+    then everywhere. A `label` is the step's name in plans and `bench --steps`, beside its node and number. A step that
+    draws nothing where an earlier one of the node drew nothing names that one's label (`if_drawn`): the device then
+    skips it, without the CPU waiting for the answer.
     """
 
     def __init__(self, ports: Mapping[str, Port], node_id: str, type_name: str, recorder: Recorder) -> None:
@@ -245,7 +246,8 @@ class Steps:
             vertices: a count, or a buffer port with indirect draw commands: four 32-bit integers (count, instances,
                 first, base instance) and one that is ignored.
             command: which of those commands, from 0.
-            attributes: layout to buffer port, the layout as `3f 2f in_position in_uv`.
+            attributes: layout to buffer port, the layout as `3f 2f in_position in_uv`; with `/i` after the formats
+                (`4f/i in_color`) they advance per instance.
             topology, instances: as in OpenGL.
             out, state, region, defines, label, bindings: see the class.
             view, view_index: as for `geometry`.
