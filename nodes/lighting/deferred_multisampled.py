@@ -80,7 +80,7 @@ class DeferredMultisampled(DeferredLighting):
         steps.fullscreen(
             "deferred_lighting.frag",
             out=self.pictures(steps) | lit,
-            defines={"LIT_ONCE": 1},
+            defines={"SHADE_ONCE": 1},
             label="pixels",
             edges=self.edges,
             **reads,
@@ -96,10 +96,10 @@ class DeferredMultisampled(DeferredLighting):
             )
         here = StencilFace(reference=_EDGE, depth_pass="replace")
         marking = State(depth_test=False, depth_write=False, stencil=Stencil(here))
-        steps.fullscreen("mark_edges.frag", out=self.marks, edges=self.edges, state=marking, label="marks")
+        steps.fullscreen("edge_stencil.frag", out=self.marks, edges=self.edges, state=marking, label="marks")
         steps.clear(self.tiles)
         steps.compute(
-            "marked_tiles.comp",
+            "edge_tiles.comp",
             over=tuple(-(-side // _TILE) for side in steps.desc(self.edges).size),
             out={"tiles": self.tiles},
             defines={"TILE": _TILE, **({"HAS_SHADOW_DIFFERENCE": 1} if lit else {})},
@@ -130,7 +130,7 @@ class DeferredMultisampled(DeferredLighting):
         for number in range(first, steps.desc(self.depth).samples):
             steps.draw(
                 "deferred_lighting.frag",
-                vertex="marked_tiles.vert",
+                vertex="edge_tiles.vert",
                 vertices=self.tiles,
                 topology="points",
                 command=0 if number else 1,

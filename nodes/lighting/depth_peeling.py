@@ -71,8 +71,8 @@ class DepthPeeling(ForwardTransparent):
         most = most_layers(steps.facts)
         count = min(most, _MOST_LAYERS) if self.layers == "auto" else min(most, self.layers)
         for number in range(count):
-            nearest, before = (self.odd, self.even) if number % 2 else (self.even, self.odd)
-            reads: dict[str, Any] = {"depth": self.depth, **lit, **({"before": before} if number else {})}
+            nearest, previous = (self.odd, self.even) if number % 2 else (self.even, self.odd)
+            reads: dict[str, Any] = {"depth": self.depth, **lit, **({"previous_depth": previous} if number else {})}
             if number > 0:
                 steps.clear(self.layer)
             if number > 1:
@@ -88,8 +88,8 @@ class DepthPeeling(ForwardTransparent):
                 **reads,
             )
             steps.fullscreen(
-                "lay.frag",
-                out={"laid": self.peeled},
+                "composite.frag",
+                out={"color": self.peeled},
                 state=State(blend=UNDER),
                 label=f"under {number + 1}",
                 if_drawn=f"layer {number + 1}",
@@ -97,5 +97,5 @@ class DepthPeeling(ForwardTransparent):
             )
         if steps.used(self.radiance):
             steps.fullscreen(
-                "lay.frag", out={"laid": self.radiance}, state=State(blend=PREMULTIPLIED), source=self.peeled
+                "composite.frag", out={"color": self.radiance}, state=State(blend=PREMULTIPLIED), source=self.peeled
             )

@@ -75,7 +75,7 @@ class ImageBasedLight(Node):
         kept=True,
         doc="Mean radiance of the cells of a cube, level by level.",
     )
-    leaning = Internal(
+    light_directions = Internal(
         kind="texture2d_array",
         format="rgba32f",
         layers=6,
@@ -164,7 +164,7 @@ class ImageBasedLight(Node):
     def record(self, steps: Steps) -> None:
         """Cells, harmonics of one level of theirs, and a dispatch for each roughness."""
         side = _cells_side(self)
-        pictures = {"cells": self.cells, "leaning": self.leaning}
+        pictures = {"cells": self.cells, "light_directions": self.light_directions}
         steps.compute(
             "environment_cells.comp",
             over=(side, side, 6),
@@ -174,11 +174,11 @@ class ImageBasedLight(Node):
         )
         for level in range(1, steps.desc(self.cells).mips):
             steps.compute(
-                "environment_halve.comp",
+                "environment_downsample.comp",
                 over=(side >> level, side >> level, 6),
                 cells=self.cells.mip(level - 1),
-                leaning=self.leaning.mip(level - 1),
-                out={f"fewer_{name}": picture.mip(level) for name, picture in pictures.items()},
+                light_directions=self.light_directions.mip(level - 1),
+                out={f"coarse_{name}": picture.mip(level) for name, picture in pictures.items()},
                 label=f"{side >> level} cells",
             )
         steps.compute(
@@ -221,7 +221,7 @@ class ImageBasedLight(Node):
             "environment_integral.comp",
             over=over,
             cells=self.cells,
-            leaning=self.leaning,
+            light_directions=self.light_directions,
             roughness=roughness,
             out=out,
             label=label,

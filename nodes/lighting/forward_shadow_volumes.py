@@ -47,5 +47,5 @@ class ForwardShadowVolumes(CountsVolumes, ForwardMultipass):
             )
             if layer is not None:
                 state = State(depth_test=False, depth_write=False, stencil=WIPE)
-                steps.fullscreen("wipe.frag", out=self.surface_depth, state=state, region=layer)
+                steps.fullscreen("clear_stencil.frag", out=self.surface_depth, state=state, region=layer)
         self.blend_after(steps)

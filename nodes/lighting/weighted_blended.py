@@ -23,8 +23,8 @@ class WeightedBlended(ForwardTransparent):
     much as it should.
     """
 
-    sums = Internal(format="rgba32f", samples=samples_stored, clear=0.0)
-    left = Internal(format="r16f", samples=samples_stored, clear=1.0)
+    accumulation = Internal(format="rgba32f", samples=samples_stored, clear=0.0)
+    revealage = Internal(format="r16f", samples=samples_stored, clear=1.0)
 
     weight: Literal["distance_squared", "distance_cubed", "distance_fourth", "window_depth", "opacity"] = define(
         default="distance_cubed",
@@ -46,7 +46,7 @@ class WeightedBlended(ForwardTransparent):
         Lighting.record(self, steps)
         steps.geometry(
             "weighted_blended.frag",
-            out={"sums": self.sums, "left": self.left},
+            out={"accumulation": self.accumulation, "revealage": self.revealage},
             objects="transparent",
             view=self.depth,
             state=State(blend=(ADD, _HIDE), depth_write=False),
@@ -54,9 +54,9 @@ class WeightedBlended(ForwardTransparent):
             **self.lights_of(steps, self.lookup),
         )
         steps.fullscreen(
-            "weighted_mean.frag",
+            "weighted_composite.frag",
             out={"radiance": self.radiance},
             state=State(blend=PREMULTIPLIED),
-            sums=self.sums,
-            left=self.left,
+            accumulation=self.accumulation,
+            revealage=self.revealage,
         )

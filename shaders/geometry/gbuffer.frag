@@ -1,27 +1,27 @@
-// The surface under a fragment, as it is kept for later passes; `gbuffer_surface.glsl` reads it back.
+// Writes the surface of a fragment to the G-buffer; `gbuffer_surface.glsl` reads it back.
 #include <pass_view.glsl>
 #include <fragment_surface.glsl>
 
 #ifdef WRITES_ALBEDO
-out vec4 albedo;  // root of the base colour; 1
+out vec4 albedo;  // square root of the base colour; 1
 #endif
 #ifdef WRITES_NORMAL
-out vec4 normal;  // for shading, world space; 0
+out vec4 normal;  // shading normal in world space; 0
 #endif
 #ifdef WRITES_MATERIAL
-out vec4 material;  // metallic, roughness, occlusion; 1 where lights reach, 0 unlit
+out vec4 material;  // metallic, roughness, occlusion; 0 if unlit, else 1
 #endif
 #ifdef WRITES_EMISSIVE
 out vec4 emissive;
 #endif
 #ifdef WRITES_SPECULAR
-out vec4 specular;  // of what is not metal: root of f0, for 0.04 is then a whole number of 255ths; f90
+out vec4 specular;  // of the dielectric part: square root of f0 (0.04 then quantizes to 8 bits exactly); f90
 #endif
 #ifdef WRITES_GRAIN
-out vec4 grain;  // direction, world space; strength
+out vec4 grain;  // tangent in world space; anisotropy strength
 #endif
 #ifdef WRITES_PHONG_DIFFUSE
-out vec4 phong_diffuse;  // this and the next two: roots, for dark ones are multiplied by a light as bright as any
+out vec4 phong_diffuse;  // square roots, here and below: dark reflectances need finer steps under bright lights
 #endif
 #ifdef WRITES_PHONG_SPECULAR
 out vec4 phong_specular;

@@ -1,14 +1,14 @@
-// What an alpha mask leaves of a fragment. With several samples a texel each is asked, by alpha as it runs on straight
-// from here: alpha to coverage, with edges where the mask has them instead of a pattern.
+// Alpha masking. With multisampling, alpha is extrapolated linearly to each sample position (alpha to coverage), so
+// that the edges of the mask are antialiased.
 void alpha_test(float alpha, float cutoff) {
 #if PASS_SAMPLES > 1
-    vec2 slope = vec2(dFdx(alpha), dFdy(alpha));
-    int covered = 0;
+    vec2 gradient = vec2(dFdx(alpha), dFdy(alpha));
+    int coverage = 0;
     for (int i = 0; i < PASS_SAMPLES; ++i) {
-        if (alpha + dot(slope, PASS_SAMPLE_POSITIONS[i] - 0.5) >= cutoff) covered |= 1 << i;
+        if (alpha + dot(gradient, PASS_SAMPLE_POSITIONS[i] - 0.5) >= cutoff) coverage |= 1 << i;
     }
-    if (covered == 0) discard;
-    gl_SampleMask[0] = covered;
+    if (coverage == 0) discard;
+    gl_SampleMask[0] = coverage;
 #else
     if (alpha < cutoff) discard;
 #endif

@@ -1,4 +1,4 @@
-// Base colour and alpha of a fragment: factor, texture, vertex colour.
+// Base colour and alpha of a fragment: material factor × texture × vertex colour.
 #include <materials.glsl>
 #include <texture_coordinates.glsl>
 

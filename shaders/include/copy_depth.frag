@@ -1,4 +1,4 @@
-// Depth into another depth texture.
+// Copies depth into another depth texture.
 #include <per_sample.glsl>
 
 uniform SAMPLER_2D depth;

@@ -1,24 +1,24 @@
-// Cube maps: the direction of a texel, and how much of the sphere it covers.
+// Cube maps: directions and solid angles of texels. A position on a face runs from -1 to 1 along both sides.
 
-// Unit direction of a point of a face, whose sides run from -1 to 1, in the order of OpenGL's faces.
-vec3 cube_direction(int face, vec2 place) {
+// Unit direction of a position on a face; the faces are in OpenGL's order.
+vec3 cube_direction(int face, vec2 position) {
     vec3 direction;
-    if (face == 0) direction = vec3(1.0, -place.y, -place.x);
-    else if (face == 1) direction = vec3(-1.0, -place.y, place.x);
-    else if (face == 2) direction = vec3(place.x, 1.0, place.y);
-    else if (face == 3) direction = vec3(place.x, -1.0, -place.y);
-    else if (face == 4) direction = vec3(place.x, -place.y, 1.0);
-    else direction = vec3(-place.x, -place.y, -1.0);
+    if (face == 0) direction = vec3(1.0, -position.y, -position.x);
+    else if (face == 1) direction = vec3(-1.0, -position.y, position.x);
+    else if (face == 2) direction = vec3(position.x, 1.0, position.y);
+    else if (face == 3) direction = vec3(position.x, -1.0, -position.y);
+    else if (face == 4) direction = vec3(position.x, -position.y, 1.0);
+    else direction = vec3(-position.x, -position.y, -1.0);
     return normalize(direction);
 }
 
-// The middle of a texel of a face of `side` texels, from -1 to 1.
-vec2 cube_texel_center(ivec2 texel, int side) {
-    return (vec2(texel) + 0.5) * (2.0 / float(side)) - 1.0;
+// Position of the centre of a texel on a face of `size` × `size` texels.
+vec2 cube_texel_center(ivec2 texel, int size) {
+    return (vec2(texel) + 0.5) * (2.0 / float(size)) - 1.0;
 }
 
-// Steradians of a texel around a place.
-float cube_solid_angle(vec2 place, int side) {
-    float square = 1.0 + dot(place, place);
-    return 4.0 / (float(side * side) * square * sqrt(square));
+// Solid angle in steradians of a texel that is centred at a position.
+float cube_solid_angle(vec2 position, int size) {
+    float squared_distance = 1.0 + dot(position, position);
+    return 4.0 / (float(size * size) * squared_distance * sqrt(squared_distance));
 }

@@ -1,4 +1,4 @@
-// Depth alone; fragments that an alpha mask cuts away are dropped.
+// Writes depth only, and discards fragments that the alpha mask cuts away.
 #ifdef ALPHA_MASK
 #include <alpha_mask.glsl>
 #include <base_color.glsl>

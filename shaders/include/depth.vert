@@ -1,4 +1,4 @@
-// Positions alone, and what an alpha mask needs where there is one.
+// Transforms positions only, with the varyings of an alpha mask where the material has one.
 #include <mask_vertex.glsl>
 #include <transform.glsl>
 

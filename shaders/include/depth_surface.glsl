@@ -1,54 +1,59 @@
-// Positions and geometric normals from a depth texture, by way of the view it was drawn with: of one sample of a texel,
-// by its number, or in the middle of all.
+// Reconstructs positions and geometric normals from a depth texture, with the view that it was rendered with. A sample
+// index of TEXEL_CENTER means the centre of a texel, averaged over all samples.
 #if DEPTH_SAMPLES > 1
 uniform sampler2DMS depth;
 const int TEXEL_CENTER = -1;
-#define SAMPLE_POSITION(number) DEPTH_SAMPLE_POSITIONS[number]
+#define SAMPLE_POSITION(index) DEPTH_SAMPLE_POSITIONS[index]
 #else
 uniform sampler2D depth;
 const int TEXEL_CENTER = 0;
-#define SAMPLE_POSITION(number) vec2(0.5)
+#define SAMPLE_POSITION(index) vec2(0.5)
 #endif
 
-vec3 position_from_depth(ivec2 texel, vec2 place, float d) {
-    return world_position(depth_views[0], (vec2(texel) + place) * depth_views[0].viewport.zw, d);
+// World-space position at an offset (0 to 1) within a texel.
+vec3 position_from_depth(ivec2 texel, vec2 offset, float window_depth) {
+    return world_position(depth_views[0], (vec2(texel) + offset) * depth_views[0].viewport.zw, window_depth);
 }
 
-vec3 position_at_sample(ivec2 texel, int number, out float d) {
-    d = texelFetch(depth, texel, number).r;
-    return position_from_depth(texel, SAMPLE_POSITION(number), d);
+vec3 position_at_sample(ivec2 texel, int sample_index, out float window_depth) {
+    window_depth = texelFetch(depth, texel, sample_index).r;
+    return position_from_depth(texel, SAMPLE_POSITION(sample_index), window_depth);
 }
 
-vec3 position_at(ivec2 texel, int number, out float d) {
+vec3 position_at(ivec2 texel, int sample_index, out float window_depth) {
 #if DEPTH_SAMPLES > 1
-    if (number == TEXEL_CENTER) {  // of a plane the mean of depths is the depth at the mean of places: the middle
-        d = 0.0;
-        for (int i = 0; i < DEPTH_SAMPLES; ++i) d += texelFetch(depth, texel, i).r / float(DEPTH_SAMPLES);
-        return position_from_depth(texel, vec2(0.5), d);
+    if (sample_index == TEXEL_CENTER) {
+        // On a plane the mean depth of the samples is the depth at their mean position, the texel's centre.
+        window_depth = 0.0;
+        for (int i = 0; i < DEPTH_SAMPLES; ++i) window_depth += texelFetch(depth, texel, i).r / float(DEPTH_SAMPLES);
+        return position_from_depth(texel, vec2(0.5), window_depth);
     }
 #endif
-    return position_at_sample(texel, number, d);
+    return position_at_sample(texel, sample_index, window_depth);
 }
 
-// The step from the point to its neighbours along one axis, on the side where depth is closer to a straight line.
-vec3 along(ivec2 texel, int number, ivec2 axis, vec3 here, float d) {
+// Difference of world positions between neighbouring texels along a screen axis. It is taken towards the neighbour on
+// the side where depth is closer to linear, which is the side that lies on the same surface.
+vec3 screen_derivative(ivec2 texel, int sample_index, ivec2 axis, vec3 position, float window_depth) {
     ivec2 last = ivec2(depth_views[0].viewport.xy) - 1;
-    float before = texelFetch(depth, max(texel - axis, ivec2(0)), number).r;
-    float after = texelFetch(depth, min(texel + axis, last), number).r;
-    float before2 = texelFetch(depth, max(texel - 2 * axis, ivec2(0)), number).r;
-    float after2 = texelFetch(depth, min(texel + 2 * axis, last), number).r;
-    bool at_left = any(lessThan(texel - axis, ivec2(0)));
-    bool at_right = any(greaterThan(texel + axis, last));
-    bool use_left = !at_left && (at_right || abs(2.0 * before - before2 - d) < abs(2.0 * after - after2 - d));
-    ivec2 beside = clamp(use_left ? texel - axis : texel + axis, ivec2(0), last);
-    vec3 there = position_from_depth(beside, SAMPLE_POSITION(number), use_left ? before : after);
-    return use_left ? here - there : there - here;
+    float left = texelFetch(depth, max(texel - axis, ivec2(0)), sample_index).r;
+    float right = texelFetch(depth, min(texel + axis, last), sample_index).r;
+    float left2 = texelFetch(depth, max(texel - 2 * axis, ivec2(0)), sample_index).r;
+    float right2 = texelFetch(depth, min(texel + 2 * axis, last), sample_index).r;
+    bool at_left_border = any(lessThan(texel - axis, ivec2(0)));
+    bool at_right_border = any(greaterThan(texel + axis, last));
+    float left_error = abs(2.0 * left - left2 - window_depth), right_error = abs(2.0 * right - right2 - window_depth);
+    bool use_left = !at_left_border && (at_right_border || left_error < right_error);
+    ivec2 neighbour = clamp(use_left ? texel - axis : texel + axis, ivec2(0), last);
+    vec3 other = position_from_depth(neighbour, SAMPLE_POSITION(sample_index), use_left ? left : right);
+    return use_left ? position - other : other - position;
 }
 
-// Unit normal of the surface at a texel, towards the viewer: of each pair of neighbours the one on the same surface.
-vec3 geometric_normal_at(ivec2 texel, int number, vec3 position, float d) {
-    if (number == TEXEL_CENTER) position = position_at_sample(texel, number = 0, d);
-    vec3 crossed =
-        cross(along(texel, number, ivec2(1, 0), position, d), along(texel, number, ivec2(0, 1), position, d));
-    return crossed * inversesqrt(max(dot(crossed, crossed), 1e-37));
+// Unit geometric normal of the surface at a texel, facing the viewer.
+vec3 geometric_normal_at(ivec2 texel, int sample_index, vec3 position, float window_depth) {
+    if (sample_index == TEXEL_CENTER) position = position_at_sample(texel, sample_index = 0, window_depth);
+    vec3 dx = screen_derivative(texel, sample_index, ivec2(1, 0), position, window_depth);
+    vec3 dy = screen_derivative(texel, sample_index, ivec2(0, 1), position, window_depth);
+    vec3 normal = cross(dx, dy);
+    return normal * inversesqrt(max(dot(normal, normal), 1e-37));
 }

@@ -1,4 +1,4 @@
-// A level of a mip chain: the exact area mean of the level above.
+// A level of a mip chain: the exact area average of the level above.
 #include <downsample.glsl>
 
 uniform sampler2D source;  // the level above

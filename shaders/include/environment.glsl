@@ -1,12 +1,12 @@
-// What is around the scene: how its picture is turned, and where in it a direction lies.
+// Rotation and intensity of the scene's environment map.
 #include <math.glsl>
 
 layout(std140) uniform environment_block {
-    vec4 environment_transform;  // cosine and sine of the angle about +Y, a factor on its radiance, 0
+    vec4 environment_transform;  // cosine and sine of the rotation about +Y, intensity, 0
 };
 
-// A direction of the world as the picture has it.
+// Rotates a world-space direction into the space of the environment map.
 vec3 world_to_environment(vec3 direction) {
-    vec2 turn = environment_transform.xy;
-    return vec3(turn.x * direction.x - turn.y * direction.z, direction.y, turn.y * direction.x + turn.x * direction.z);
+    vec2 r = environment_transform.xy;
+    return vec3(r.x * direction.x - r.y * direction.z, direction.y, r.y * direction.x + r.x * direction.z);
 }

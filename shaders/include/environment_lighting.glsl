@@ -1,62 +1,62 @@
-// Light from all around a surface, of the environment or the constant. `light_from()` is the framework's.
+// Lighting of a surface by the environment, or by the constant ambient light. rendergraph provides `light_from()`.
 #include <shading.glsl>
 
 uniform vec3 ambient;
 #if defined(HAS_ENVIRONMENT) && !defined(NEEDS_PHONG) && !defined(NEEDS_NOTHING)
 #define HAS_ENVIRONMENT_SPECULAR
-uniform sampler2D brdf_table;  // over the root of N.V and roughness: how much is mirrored, as f0 x + f90 y
+uniform sampler2D brdf_table;  // split-sum BRDF over (sqrt(NoV), roughness): the reflectance is f0 * x + f90 * y
 #endif
 
-// Where what is mirrored towards the viewer comes from. A grain spreads that across itself: the normal is bent towards
-// the one of a cylinder along the grain (Revie 2012), more for a rough surface, as KHR_materials_anisotropy does it.
+// The direction that the specular lobe is looked up in. For anisotropic surfaces the normal is bent towards the normal
+// of a cylinder along the grain (Revie 2012), more for rough surfaces, as in KHR_materials_anisotropy.
 vec3 reflection_direction(Surface s) {
     vec3 normal = s.normal;
 #ifdef NEEDS_GRAIN
     if (s.anisotropy > 0.0) {
-        vec3 bent = cross(cross(s.bitangent, s.view_dir), s.bitangent);
-        float straight = 1.0 - s.anisotropy * (1.0 - s.roughness);
-        straight *= straight;
-        normal = normalize(mix(normalize(bent + normal * 1e-6), normal, straight * straight));
+        vec3 bent_normal = cross(cross(s.bitangent, s.view_dir), s.bitangent);
+        float isotropy = 1.0 - s.anisotropy * (1.0 - s.roughness);
+        isotropy *= isotropy;
+        normal = normalize(mix(normalize(bent_normal + normal * 1e-6), normal, isotropy * isotropy));
     }
 #endif
     return reflect(-s.view_dir, normal);
 }
 
-// The constant, or the environment's: what reaches a diffuse surface, for it to be multiplied with, and what is
-// mirrored towards the viewer. The empirical models mirror nothing.
+// Light reflected from the environment, or the ambient constant. The diffuse part is not yet multiplied by the diffuse
+// reflectance. The empirical shading models reflect no specular environment light.
 ReflectedLight environment_lighting(Surface s) {
 #ifndef HAS_ENVIRONMENT
     return ReflectedLight(ambient, vec3(0.0));
 #else
-    ReflectedLight around = ReflectedLight(light_from(s.normal, 2.0), vec3(0.0));
+    ReflectedLight light = ReflectedLight(light_from(s.normal, 2.0), vec3(0.0));
 #ifdef HAS_ENVIRONMENT_SPECULAR
     float NoV = clamp(dot(s.normal, s.view_dir), 0.0, 1.0);
-    vec2 mirrored = textureLod(brdf_table, vec2(sqrt(NoV), s.roughness), 0.0).xy;
-    float lobe = clamp(s.roughness, 0.0, 1.0);  // a compiler that sees its range leaves out all other lobes
-    around.specular = light_from(reflection_direction(s), lobe) * (s.f0 * mirrored.x + s.f90 * mirrored.y);
+    vec2 brdf = textureLod(brdf_table, vec2(sqrt(NoV), s.roughness), 0.0).xy;
+    float lobe = clamp(s.roughness, 0.0, 1.0);  // the explicit range lets compilers remove the other kinds of lobe
+    light.specular = light_from(reflection_direction(s), lobe) * (s.f0 * brdf.x + s.f90 * brdf.y);
 #if MULTIPLE_SCATTERING
-    // Light that leaves a rough surface after more than one reflection (Turquin 2019).
-    around.specular *= 1.0 + s.f0 * (1.0 / max(mirrored.x + mirrored.y, 1e-3) - 1.0);
+    // Energy compensation for multiple scattering between microfacets (Turquin 2019).
+    light.specular *= 1.0 + s.f0 * (1.0 / max(brdf.x + brdf.y, 1e-3) - 1.0);
 #endif
 #if ENVIRONMENT_PART == ENVIRONMENT_PART_TABLE
-    around.specular = vec3(mirrored, 0.0);
+    light.specular = vec3(brdf, 0.0);
 #endif
 #endif
 #if ENVIRONMENT_PART == ENVIRONMENT_PART_DIFFUSE
-    around.specular = vec3(0.0);
+    light.specular = vec3(0.0);
 #elif ENVIRONMENT_PART != ENVIRONMENT_PART_ALL
-    around.diffuse = vec3(0.0);
+    light.diffuse = vec3(0.0);
 #endif
-    return around;
+    return light;
 #endif
 }
 
-// How much of what is mirrored is not hidden, where `open` of a diffuse surface's light is not (Lagarde 2014).
-float specular_occlusion(Surface s, float open) {
+// Visibility of the specular environment light, from the ambient occlusion of the diffuse light (Lagarde 2014).
+float specular_occlusion(Surface s, float occlusion) {
 #if SPECULAR_OCCLUSION
     float NoV = clamp(dot(s.normal, s.view_dir), 1e-4, 1.0);
-    return clamp(pow(NoV + open, exp2(-16.0 * s.roughness - 1.0)) - 1.0 + open, 0.0, 1.0);
+    return clamp(pow(NoV + occlusion, exp2(-16.0 * s.roughness - 1.0)) - 1.0 + occlusion, 0.0, 1.0);
 #else
-    return open;
+    return occlusion;
 #endif
 }

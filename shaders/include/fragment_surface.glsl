@@ -1,4 +1,4 @@
-// The surface under a fragment of the scene's geometry: varyings, material factors, textures.
+// The surface of a fragment of the scene's geometry, from varyings, material factors and textures.
 #include <alpha_mask.glsl>
 #include <base_color.glsl>
 #include <math.glsl>
@@ -6,7 +6,7 @@
 
 in vec3 v_position;
 #if PASS_SAMPLES > 1
-centroid in vec4 v_centroid_position;  // v_position and 1, but on the surface
+centroid in vec4 v_centroid_position;  // v_position and 1, interpolated at the centroid, which lies on the surface
 #endif
 centroid in vec3 v_normal;
 flat in int v_material;
@@ -44,7 +44,7 @@ uniform sampler2D anisotropy_texture;
 #define NORMAL_UV 0
 #endif
 
-// Tangent along the image's rows and bitangent up its columns, as glTF's normal maps have them.
+// Tangent along the rows of the normal map and bitangent up its columns, as in glTF.
 void tangent_frame(vec3 normal, out vec3 tangent, out vec3 bitangent) {
 #ifdef HAS_TANGENT
     tangent = normalize(v_tangent.xyz);
@@ -52,14 +52,14 @@ void tangent_frame(vec3 normal, out vec3 tangent, out vec3 bitangent) {
 #else
     // From the derivatives of position and texture coordinates (Schueler 2013).
     vec2 uv = UV_SET(NORMAL_UV);
-    vec3 across = dFdx(v_position), up = dFdy(v_position);
-    vec2 uv_across = dFdx(uv), uv_up = dFdy(uv);
-    vec3 u_plane = cross(up, normal), v_plane = cross(normal, across);
-    tangent = u_plane * uv_across.x + v_plane * uv_up.x;
-    bitangent = -(u_plane * uv_across.y + v_plane * uv_up.y);
+    vec3 position_dx = dFdx(v_position), position_dy = dFdy(v_position);
+    vec2 uv_dx = dFdx(uv), uv_dy = dFdy(uv);
+    vec3 perpendicular_dx = cross(position_dy, normal), perpendicular_dy = cross(normal, position_dx);
+    tangent = perpendicular_dx * uv_dx.x + perpendicular_dy * uv_dy.x;
+    bitangent = -(perpendicular_dx * uv_dx.y + perpendicular_dy * uv_dy.y);
     float longest = max(dot(tangent, tangent), dot(bitangent, bitangent));
     float shortest = min(dot(tangent, tangent), dot(bitangent, bitangent));
-    if (shortest < max(1e-30, 1e-12 * longest)) {  // no texture coordinates, or all on a line: any frame will do
+    if (shortest < max(1e-30, 1e-12 * longest)) {  // no usable texture coordinates: any frame will do
         tangent = any_tangent(normal);
         bitangent = cross(normal, tangent);
     } else {
@@ -70,19 +70,19 @@ void tangent_frame(vec3 normal, out vec3 tangent, out vec3 bitangent) {
 }
 #endif
 
-// Everything but lighting. Fragments cut away by an alpha mask end here.
+// Everything a shading model reads. Fragments that the alpha mask cuts away are discarded here.
 Surface fragment_surface(View view) {
     MaterialData m = materials[MATERIAL_INDEX(v_material)];
     Surface s;
 #if PASS_SAMPLES > 1
-    s.position = v_centroid_position.xyz / v_centroid_position.w;  // llvmpipe divides by the w of the pixel's middle: the 1 shows it
+    // llvmpipe interpolates at the centroid, but divides by the w of the pixel centre. The interpolated 1 undoes that.
+    s.position = v_centroid_position.xyz / v_centroid_position.w;
 #else
     s.position = v_position;
 #endif
     s.view_dir = view_dir(view, s.position);
-    // Derivatives of the window's axes, right then up, so that it looks at the viewer.
-    vec3 crossed = cross(dFdx(v_position), dFdy(v_position));
-    s.geometric_normal = crossed * inversesqrt(max(dot(crossed, crossed), 1e-37));
+    vec3 geometric_normal = cross(dFdx(v_position), dFdy(v_position));  // x points right and y up: it faces the viewer
+    s.geometric_normal = geometric_normal * inversesqrt(max(dot(geometric_normal, geometric_normal), 1e-37));
 
     vec4 base = fragment_base_color(v_material);
     s.base_color = base.rgb;
@@ -111,17 +111,19 @@ Surface fragment_surface(View view) {
     tangent_frame(s.normal, s.tangent, s.bitangent);
 #endif
 #ifdef HAS_NORMAL_TEXTURE
-    vec3 mapped = texture(normal_texture, slot_uv(v_material, NORMAL_SLOT, UV_SET(NORMAL_UV))).xyz * 2.0 - 1.0;
-    mapped.xy *= m.surface.w;
-    s.normal = normalize(mat3(s.tangent, s.bitangent, s.normal) * mapped);
+    vec2 normal_uv = slot_uv(v_material, NORMAL_SLOT, UV_SET(NORMAL_UV));
+    vec3 tangent_normal = texture(normal_texture, normal_uv).xyz * 2.0 - 1.0;
+    tangent_normal.xy *= m.surface.w;
+    s.normal = normalize(mat3(s.tangent, s.bitangent, s.normal) * tangent_normal);
 #endif
 #ifdef NEEDS_GRAIN
     s.anisotropy = m.extra.y;
-    vec2 grain = vec2(cos(m.extra.z), sin(m.extra.z));
+    vec2 grain = vec2(cos(m.extra.z), sin(m.extra.z));  // direction in the tangent plane
 #ifdef HAS_ANISOTROPY_TEXTURE
-    vec3 combed = texture(anisotropy_texture, slot_uv(v_material, ANISOTROPY_SLOT, UV_SET(ANISOTROPY_UV))).rgb;
-    grain = mat2(grain.x, grain.y, -grain.y, grain.x) * (combed.rg * 2.0 - 1.0);
-    s.anisotropy *= combed.b;
+    vec2 anisotropy_uv = slot_uv(v_material, ANISOTROPY_SLOT, UV_SET(ANISOTROPY_UV));
+    vec3 anisotropy = texture(anisotropy_texture, anisotropy_uv).rgb;
+    grain = mat2(grain.x, grain.y, -grain.y, grain.x) * (anisotropy.rg * 2.0 - 1.0);
+    s.anisotropy *= anisotropy.b;
 #endif
     s.tangent = normalize(s.tangent) * grain.x + normalize(s.bitangent) * grain.y;
     s.tangent = normalize(s.tangent - s.normal * dot(s.normal, s.tangent));
@@ -138,10 +140,10 @@ Surface fragment_surface(View view) {
 #endif
     s.occlusion = 1.0;
 #ifdef HAS_OCCLUSION_TEXTURE
-    float open = texture(occlusion_texture, slot_uv(v_material, OCCLUSION_SLOT, UV_SET(OCCLUSION_UV))).r;
-    s.occlusion += m.surface.z * (open - 1.0);
+    float occlusion = texture(occlusion_texture, slot_uv(v_material, OCCLUSION_SLOT, UV_SET(OCCLUSION_UV))).r;
+    s.occlusion += m.surface.z * (occlusion - 1.0);
 #endif
-#ifdef NO_EMISSIVE  // no material of the scene glows
+#ifdef NO_EMISSIVE  // no material of the scene is emissive
     s.emissive = vec3(0.0);
 #else
     s.emissive = m.emissive.rgb;

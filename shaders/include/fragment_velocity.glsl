@@ -1,4 +1,4 @@
-// How far a fragment's point has moved since the frame before, of what `transform.glsl` passes on.
+// Screen-space motion of a fragment since the previous frame, from the varyings of `transform.glsl`.
 #include <previous_pass_view.glsl>
 #include <velocity.glsl>
 

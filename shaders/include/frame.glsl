@@ -1,7 +1,7 @@
-// Time of the frame that is drawn.
+// Time and number of the current frame.
 layout(std140) uniform frame_block {
     float time;        // seconds since frame 1
-    float delta_time;  // seconds since the frame before
+    float delta_time;  // seconds since the previous frame
     int frame_index;   // from 1
-    int still_frames;  // how many frames before this one nothing has moved: camera, scene or parameters
+    int still_frames;  // number of previous frames since the camera, the scene or a parameter last changed
 };

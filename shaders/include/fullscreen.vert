@@ -1,5 +1,5 @@
-// One triangle over the whole target, at the far plane.
-out vec2 v_uv;  // 0 to 1 over the target, bottom left first
+// One triangle that covers the render target, at the far plane.
+out vec2 v_uv;  // 0 to 1 over the target, from the bottom left
 
 void main() {
     v_uv = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2);

@@ -1,4 +1,4 @@
-// The scene's vertices in world and clip space, with what materials need.
+// Transforms the scene's vertices and passes on everything that materials need.
 #include <geometry_vertex.glsl>
 
 void main() {

@@ -1,7 +1,7 @@
-// One vertex of the scene in world and clip space. What no later stage reads, the linker takes out again. Where a pixel
-// has several samples, a surface that misses its middle is interpolated where it is (`centroid`). The position is
-// there twice: `v_centroid_position` on the surface, and `v_position` in the middle of pixels, whose derivatives are the
-// triangle's plane.
+// Transforms a vertex of the scene to world and clip space, and writes all varyings. The linker removes the ones that
+// no later stage reads. With multisampling, a triangle may miss the pixel centre, so varyings are interpolated at the
+// centroid, which lies on the surface. The position is also interpolated at the pixel centre, as `v_position`: its
+// derivatives lie in the plane of the triangle.
 #include <material_vertex.glsl>
 #include <transform.glsl>
 
@@ -22,7 +22,8 @@ centroid out vec4 v_tangent;
 void transform_vertex() {
     v_position = object_to_world(in_position);
 #if PASS_SAMPLES > 1
-    v_centroid_position = vec4(v_position, PASS_VIEW.viewport.x * PASS_VIEW.viewport.z);  // 1, and no compiler sees that it is
+    // w is 1, in a form that compilers do not fold to a constant.
+    v_centroid_position = vec4(v_position, PASS_VIEW.viewport.x * PASS_VIEW.viewport.z);
 #endif
     v_normal = normal_to_world(in_normal);
     write_material_varyings();

@@ -1,13 +1,13 @@
-// Points that fill the unit square evenly (Hammersley 1960), and GGX half vectors of them.
+// Low-discrepancy points in the unit square (Hammersley 1960), and GGX half vectors sampled with them.
 #include <math.glsl>
 
 vec2 hammersley(int i, int count) {
     return vec2((float(i) + 0.5) / float(count), float(bitfieldReverse(uint(i))) * 2.3283064365386963e-10);
 }
 
-// A half vector about +Z with density D (N.H).
-vec3 ggx_half_vector(vec2 point, float alpha) {
-    float cosine = sqrt((1.0 - point.x) / (1.0 + (alpha * alpha - 1.0) * point.x));
-    float sine = sqrt(max(1.0 - cosine * cosine, 0.0));
-    return vec3(sine * cos(2.0 * PI * point.y), sine * sin(2.0 * PI * point.y), cosine);
+// Half vector in tangent space (z is the normal) with density D(NoH) NoH, from a point in the unit square.
+vec3 ggx_half_vector(vec2 xi, float alpha) {
+    float cos_theta = sqrt((1.0 - xi.x) / (1.0 + (alpha * alpha - 1.0) * xi.x));
+    float sin_theta = sqrt(max(1.0 - cos_theta * cos_theta, 0.0));
+    return vec3(sin_theta * cos(2.0 * PI * xi.y), sin_theta * sin(2.0 * PI * xi.y), cos_theta);
 }

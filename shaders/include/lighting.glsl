@@ -1,40 +1,42 @@
-// A surface under all lights. `shadow()` is the framework's. With WRITES_SHADOW_DIFFERENCE it is looked up at two other
-// places than the surface's, of which the mean lights it, and it is known afterwards by how much they differ.
+// Direct lighting of a surface. rendergraph provides `shadow()`. With WRITES_SHADOW_DIFFERENCE, visibility is looked up
+// at two positions within the texel instead of at the surface's own. Their mean is used for lighting, and their
+// difference is accumulated.
 #include <lights.glsl>
 #include <luminance.glsl>
 #include <radiance.glsl>
 
 #ifdef WRITES_SHADOW_DIFFERENCE
 vec3 shadow_positions[2], shadow_normals[2];
-float could_reach = 0.0, changing = 0.0;  // irradiance without shadows, and what of it reaches one of the two places
+// Luminance of the irradiance without shadows, and the part of it whose visibility differs between the two positions.
+float unshadowed_luminance = 0.0, luminance_difference = 0.0;
 #endif
 
-// Light of one of them reflected to the viewer, by the scene's index.
+// Light of one source that the surface reflects to the viewer; `light` is the scene's index.
 ReflectedLight direct_lighting(Surface s, int light) {
 #if LIGHT_COUNT > 0 && !defined(NO_LIGHTS)
-    vec3 to_light;
-    vec3 irradiance = irradiance_from(lights[light], s.position, to_light);
-    if (dot(s.normal, to_light) > 0.0) {
+    vec3 light_dir;
+    vec3 irradiance = irradiance_from(lights[light], s.position, light_dir);
+    if (dot(s.normal, light_dir) > 0.0) {
 #ifdef WRITES_SHADOW_DIFFERENCE
-        float one = shadow(light, shadow_positions[0], shadow_normals[0]);
-        float other = shadow(light, shadow_positions[1], shadow_normals[1]);
-        float reaching = luminance_of(irradiance) * dot(s.normal, to_light);
-        could_reach += reaching;
-        changing += reaching * abs(one - other);
-        float open = 0.5 * (one + other);
+        float visibility0 = shadow(light, shadow_positions[0], shadow_normals[0]);
+        float visibility1 = shadow(light, shadow_positions[1], shadow_normals[1]);
+        float unshadowed = luminance_of(irradiance) * dot(s.normal, light_dir);
+        unshadowed_luminance += unshadowed;
+        luminance_difference += unshadowed * abs(visibility0 - visibility1);
+        float light_visibility = 0.5 * (visibility0 + visibility1);
 #else
-        float open = shadow(light, s.position, s.geometric_normal);
+        float light_visibility = shadow(light, s.position, s.geometric_normal);
 #endif
-        irradiance *= open;
+        irradiance *= light_visibility;
     }
-    ReflectedLight one = shade(s, to_light);
-    return ReflectedLight(one.diffuse * irradiance, one.specular * irradiance);
+    ReflectedLight reflectance = shade(s, light_dir);
+    return ReflectedLight(reflectance.diffuse * irradiance, reflectance.specular * irradiance);
 #else
     return ReflectedLight(vec3(0.0), vec3(0.0));
 #endif
 }
 
-// Light of all; with DIRECTIONALS_ONLY of those alone that shine everywhere.
+// Light of all sources; with DIRECTIONALS_ONLY, of the directional lights only.
 ReflectedLight direct_lighting(Surface s) {
     ReflectedLight sum = ReflectedLight(vec3(0.0), vec3(0.0));
 #if LIGHT_COUNT > 0 && !defined(NO_LIGHTS)
@@ -42,9 +44,9 @@ ReflectedLight direct_lighting(Surface s) {
 #ifdef DIRECTIONALS_ONLY
         if (lights[i].position.w > 0.0) continue;
 #endif
-        ReflectedLight one = direct_lighting(s, i);
-        sum.diffuse += one.diffuse;
-        sum.specular += one.specular;
+        ReflectedLight light = direct_lighting(s, i);
+        sum.diffuse += light.diffuse;
+        sum.specular += light.specular;
     }
 #endif
     return sum;

@@ -1,4 +1,4 @@
-// What an alpha mask needs of a vertex, where there is one.
+// Varyings that an alpha mask needs, if the material has one.
 #ifdef ALPHA_MASK
 #include <material_vertex.glsl>
 #endif

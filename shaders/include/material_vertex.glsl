@@ -1,4 +1,4 @@
-// What a vertex knows of its material: which one it is, texture coordinates, colour.
+// Vertex attributes that materials need: material index, texture coordinates, vertex colour.
 in ivec2 in_ids;  // material, object
 flat out int v_material;
 #ifdef HAS_UV0

@@ -1,11 +1,11 @@
-// Materials as the scene packs them, with their textures; texture coordinates are the vertex shader's varyings.
+// The scene's materials.
 struct MaterialData {
     vec4 base_color;
     vec4 emissive;        // rgb; w = alpha cutoff
     vec4 surface;         // metallic, roughness, occlusion strength, normal scale
     vec4 specular;        // rgb = specular colour; w = specular factor
     vec4 extra;           // dielectric f0, anisotropy strength, anisotropy rotation, 0
-    vec4 phong_diffuse;   // rgb = kd; w = the exponent n of `phong`
+    vec4 phong_diffuse;   // rgb = kd; w = exponent n of `phong`
     vec4 phong_specular;  // rgb = ks
     vec4 phong_ambient;   // rgb = ka
 };
@@ -20,7 +20,7 @@ layout(std140) uniform material_block {
 };
 #endif
 
-#ifdef HAS_UV_TRANSFORM  // 8 slots a material, two rows each: u' = a u + b v + c
+#ifdef HAS_UV_TRANSFORM  // 8 texture slots per material, two rows each: u' = a u + b v + c
 #ifdef MATERIAL_UV_STORAGE
 layout(std430) readonly buffer material_uv_block {
     vec4 material_uvs[];
@@ -41,14 +41,14 @@ const int ANISOTROPY_SLOT = 5;
 const int SPECULAR_SLOT = 6;
 const int SPECULAR_COLOR_SLOT = 7;
 
-// With one material its index is a constant, and the block is read once a draw.
+// With a single material its index is a constant, so the block is read once per draw.
 #if MATERIAL_COUNT == 1
 #define MATERIAL_INDEX(index) 0
 #else
 #define MATERIAL_INDEX(index) (index)
 #endif
 
-// Texture coordinates of a slot, with its KHR_texture_transform where the batch has any.
+// Texture coordinates of a texture slot, with its KHR_texture_transform if the batch has one.
 vec2 slot_uv(int material, int slot, vec2 uv) {
 #ifdef HAS_UV_TRANSFORM
     vec4 u = material_uvs[MATERIAL_INDEX(material) * 16 + slot * 2];

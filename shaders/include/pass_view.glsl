@@ -1,4 +1,4 @@
-// The view this pass is drawn with, PASS_VIEW: the camera, or a light's, or another's.
+// PASS_VIEW is the view that this pass is rendered with: the camera's, a light's, or another.
 #ifndef PASS_VIEW_COUNT
 #define PASS_VIEW_COUNT 1
 #endif

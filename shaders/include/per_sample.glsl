@@ -1,4 +1,5 @@
-// Textures that have as many samples as what is drawn: a fragment looks at its own, and is run for each.
+// For passes that read textures with as many samples as they render to. Reading SAMPLE_INDEX runs the shader per
+// sample.
 #if PASS_SAMPLES > 1
 #define SAMPLER_2D sampler2DMS
 #define SAMPLE_INDEX gl_SampleID

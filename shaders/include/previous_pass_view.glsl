@@ -1,4 +1,4 @@
-// The view this pass was drawn with in the frame before, PREVIOUS_PASS_VIEW.
+// PREVIOUS_PASS_VIEW is the view that this pass was rendered with in the previous frame.
 #include <pass_view.glsl>
 
 layout(std140) uniform previous_pass_view_block {

@@ -1,4 +1,4 @@
-// Radiance of a surface: its terms put together.
+// Outgoing radiance of a surface, from its emission, direct lighting and environment lighting.
 #include <environment_lighting.glsl>
 
 #if defined(UNLIT) || defined(NEEDS_NOTHING)
@@ -9,14 +9,14 @@
 uniform sampler2D occlusion;
 #endif
 
-const float MAX_HALF_FLOAT = 65504.0;  // of half floats: what is brighter would be stored as infinity
+const float MAX_HALF_FLOAT = 65504.0;  // larger values would overflow to infinity in a half-float texture
 
-// The part that is the same seen from all sides, which is what lights other surfaces.
+// The view-independent part, which lights other surfaces.
 ReflectedLight diffuse_only(ReflectedLight light) {
     return ReflectedLight(light.diffuse, vec3(0.0));
 }
 
-// The wanted terms of reflected light.
+// The sum of the terms that the parameter `terms` selects.
 vec3 selected_terms(ReflectedLight light) {
     vec3 sum = vec3(0.0);
 #if TERMS == TERMS_ALL || TERMS == TERMS_DIFFUSE
@@ -28,7 +28,7 @@ vec3 selected_terms(ReflectedLight light) {
     return sum;
 }
 
-// What an unlit surface shows: its base colour, as emission.
+// Radiance of an unlit surface: it emits its base colour.
 vec3 unlit_radiance(Surface s) {
 #if TERMS == TERMS_ALL || TERMS == TERMS_EMISSIVE
     return min(s.base_color, MAX_HALF_FLOAT);
@@ -37,9 +37,9 @@ vec3 unlit_radiance(Surface s) {
 #endif
 }
 
-// Radiance towards the viewer: the wanted terms of what lights and what all around reflect, of the latter what surface
-// and picture leave open.
-vec3 radiance_of(Surface s, ReflectedLight light, ReflectedLight around) {
+// Radiance towards the viewer: emission, direct lighting, and environment lighting scaled by the occlusion of the
+// material and of the screen-space `occlusion`. Terms that are not selected are left out.
+vec3 radiance_of(Surface s, ReflectedLight direct, ReflectedLight environment) {
 #ifdef NO_LIGHTS
     return unlit_radiance(s);
 #else
@@ -52,11 +52,11 @@ vec3 radiance_of(Surface s, ReflectedLight light, ReflectedLight around) {
     s.occlusion *= texelFetch(occlusion, ivec2(gl_FragCoord.xy), 0).r;
 #endif
 #ifdef HAS_ENVIRONMENT_SPECULAR
-    sum += around.diffuse * s.diffuse * s.occlusion + around.specular * specular_occlusion(s, s.occlusion);
+    sum += environment.diffuse * s.diffuse * s.occlusion + environment.specular * specular_occlusion(s, s.occlusion);
 #else
-    sum += around.diffuse * s.ambient * s.occlusion;
+    sum += environment.diffuse * s.ambient * s.occlusion;
 #endif
 #endif
-    return min(sum + selected_terms(light), MAX_HALF_FLOAT);
+    return min(sum + selected_terms(direct), MAX_HALF_FLOAT);
 #endif
 }

@@ -1,12 +1,12 @@
-// The shading models, one include each with one signature:
+// The shading model that the parameter `shading` selects. Each model is an include that defines
 //
-//     ReflectedLight shade(Surface surface, vec3 to_light)
+//     ReflectedLight shade(Surface surface, vec3 light_dir)
 //
-// Radiance towards the viewer for an irradiance of 1 on a surface that faces the light: the cosine is in it. The
-// diffuse part is proportional to `surface.diffuse`; light computed at vertices leaves that factor to the fragments.
-// What a model looks at and others do not it says once: `#pragma needs(phong)` for kd, ks and the exponent,
-// `needs(grain)` for the grain, `needs(grain_where_any)` for that of materials that have one, `needs(nothing)` where no
-// light shows and the base colour alone is looked at.
+// It returns the radiance towards the viewer for an irradiance of 1 on a surface that faces the light, so it includes
+// the cosine NoL. The diffuse part is proportional to `surface.diffuse`: when light is computed per vertex, fragments
+// multiply by it. A model declares what it needs beyond the common fields of `Surface`: `#pragma needs(phong)` for kd,
+// ks and the exponent, `needs(grain)` for the anisotropy, `needs(grain_where_any)` for the anisotropy of the materials
+// that have one, and `needs(nothing)` for a model that uses no light, only the base colour.
 #include <surface.glsl>
 
 struct ReflectedLight {

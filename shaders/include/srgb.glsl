@@ -1,4 +1,4 @@
-// The sRGB transfer function (IEC 61966-2-1): display-linear to encoded and back, 0 to 1.
+// The sRGB transfer function (IEC 61966-2-1) and its inverse, for values from 0 to 1.
 vec3 linear_to_srgb(vec3 c) {
     return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, greaterThan(c, vec3(0.0031308)));
 }

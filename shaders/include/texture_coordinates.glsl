@@ -1,4 +1,4 @@
-// The two sets of texture coordinates of a fragment; a mesh without them has (0, 0) everywhere.
+// The two sets of texture coordinates of a fragment; (0, 0) for meshes without them.
 #ifdef HAS_UV0
 centroid in vec2 v_uv0;
 #else
@@ -10,5 +10,5 @@ centroid in vec2 v_uv1;
 const vec2 v_uv1 = vec2(0.0);
 #endif
 
-// A slot's set: BASE_COLOR_UV and its like are 0 or 1.
-#define UV_SET(number) ((number) == 1 ? v_uv1 : v_uv0)
+// Texture coordinates of a set; BASE_COLOR_UV and similar macros are 0 or 1.
+#define UV_SET(index) ((index) == 1 ? v_uv1 : v_uv0)

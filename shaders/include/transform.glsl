@@ -1,4 +1,4 @@
-// Object to world to clip space, written once so that every pass gets the same positions to the last bit.
+// Transforms from object to world to clip space. All passes share this code, so that positions are bit-identical.
 #include <pass_view.glsl>
 
 in vec3 in_position;
@@ -7,10 +7,10 @@ in vec4 in_object1;
 in vec4 in_object2;
 #ifdef WRITES_VELOCITY
 #include <previous_pass_view.glsl>
-in vec4 in_previous0;  // the same in the frame before
+in vec4 in_previous0;  // the same rows in the previous frame
 in vec4 in_previous1;
 in vec4 in_previous2;
-centroid out vec4 v_clip_position;  // where a point is and was, in clip space
+centroid out vec4 v_clip_position;
 centroid out vec4 v_previous_clip_position;
 #endif
 
@@ -25,13 +25,13 @@ vec3 direction_to_world(vec3 d) {
     return vec3(dot(in_object0.xyz, d), dot(in_object1.xyz, d), dot(in_object2.xyz, d));
 }
 
-// -1 where the transform mirrors.
+// -1 if the object-to-world matrix mirrors, else 1.
 float handedness() {
     return dot(in_object0.xyz, cross(in_object1.xyz, in_object2.xyz)) < 0.0 ? -1.0 : 1.0;
 }
 
-// Normals go by the cofactor matrix: right for any scale, and with the sign of the determinant for mirrored objects.
-// Where every object is only turned, moved and scaled evenly (UNIFORM_SCALE) the matrix itself does.
+// Normals are transformed by the cofactor matrix, which is right for any scale, times the sign of the determinant for
+// mirrored objects. With UNIFORM_SCALE all objects have uniform scale, and the matrix itself is enough.
 vec3 normal_to_world(vec3 n) {
 #ifdef UNIFORM_SCALE
     return direction_to_world(n);
@@ -48,12 +48,12 @@ vec4 world_to_clip(vec3 position) {
     return PASS_VIEW.view_projection * vec4(position, 1.0);
 }
 
-// What a fragment needs to know how far its point has moved; `velocity.glsl` says that.
+// Writes the clip-space positions in this frame and the previous one, for `fragment_velocity()`.
 void write_velocity_varyings() {
 #ifdef WRITES_VELOCITY
     vec4 q = vec4(in_position, 1.0);
-    vec3 before = vec3(dot(in_previous0, q), dot(in_previous1, q), dot(in_previous2, q));
+    vec3 previous_position = vec3(dot(in_previous0, q), dot(in_previous1, q), dot(in_previous2, q));
     v_clip_position = world_to_clip(object_to_world(in_position));
-    v_previous_clip_position = PREVIOUS_PASS_VIEW.view_projection * vec4(before, 1.0);
+    v_previous_clip_position = PREVIOUS_PASS_VIEW.view_projection * vec4(previous_position, 1.0);
 #endif
 }

@@ -1,4 +1,4 @@
-// The environment as it is seen behind everything: laid under what the picture covers.
+// The environment behind all surfaces. Blending shows it where the picture is not covered.
 #include <pass_view.glsl>
 
 #ifdef BLURRED
@@ -12,9 +12,9 @@ out vec4 diffuse;
 
 void main() {
     View view = PASS_VIEW;
-    vec4 ahead = view.inverse_projection * vec4(v_uv * 2.0 - 1.0, 0.5, 1.0);
-    vec3 seen = view.eye.w > 0.0 ? ahead.xyz / ahead.w : vec3(0.0, 0.0, -1.0);
-    vec3 direction = normalize(mat3(view.inverse_view) * seen);
+    vec4 view_position = view.inverse_projection * vec4(v_uv * 2.0 - 1.0, 0.5, 1.0);
+    vec3 ray = view.eye.w > 0.0 ? view_position.xyz / view_position.w : vec3(0.0, 0.0, -1.0);
+    vec3 direction = normalize(mat3(view.inverse_view) * ray);
 #ifdef BLURRED
     float lobe = clamp(backdrop_blur, 0.0, 1.0);
 #else

@@ -1,26 +1,28 @@
-// Light at every pixel of a G-buffer. With DIRECTIONALS_ONLY the other lights come later.
+// Lights every pixel of a G-buffer. With DIRECTIONALS_ONLY the other lights follow in later passes.
 #include <gbuffer_surface.glsl>
 #include <lighting.glsl>
 
 uniform vec3 background;
 out vec4 radiance;  // scene-linear; alpha is coverage
 #ifdef WRITES_DIFFUSE
-out vec4 diffuse;  // the same without its specular part
+out vec4 diffuse;  // the same without the specular part
 #endif
 #ifdef WRITES_SHADOW_DIFFERENCE
-out float shadow_difference;  // between two places of what shadows leave of the light; 1 where surfaces differ
+out float shadow_difference;  // of visibility between two sample positions; 1 where samples see different surfaces
 #endif
-#ifdef LIT_ONCE
-uniform sampler2D edges;  // 1 where samples differ: there the first is lit, and the middle of all elsewhere
+#ifdef SHADE_ONCE
+uniform sampler2D edges;  // 1 where samples differ: sample 0 is shaded there, and the texel's centre elsewhere
 #endif
 
 #ifdef WRITES_SHADOW_DIFFERENCE
-// The sample that is nearest to the other side of the middle.
-int opposite(int number) {
-    vec2 other = 1.0 - DEPTH_SAMPLE_POSITIONS[number];
+// The sample that lies closest to the point opposite of a sample, with respect to the pixel's centre.
+int opposite_sample(int sample_index) {
+    vec2 opposite = 1.0 - DEPTH_SAMPLE_POSITIONS[sample_index];
     int nearest = 0;
     for (int i = 1; i < DEPTH_SAMPLES; ++i) {
-        if (distance(DEPTH_SAMPLE_POSITIONS[i], other) < distance(DEPTH_SAMPLE_POSITIONS[nearest], other)) nearest = i;
+        if (distance(DEPTH_SAMPLE_POSITIONS[i], opposite) < distance(DEPTH_SAMPLE_POSITIONS[nearest], opposite)) {
+            nearest = i;
+        }
     }
     return nearest;
 }
@@ -28,19 +30,19 @@ int opposite(int number) {
 
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
-    int number = SAMPLE_INDEX;
+    int sample_index = SAMPLE_INDEX;
 #ifdef ONE_SAMPLE
-    gl_SampleMask[0] = 1 << number;
+    gl_SampleMask[0] = 1 << sample_index;
 #endif
-#ifdef LIT_ONCE
-    if (texelFetch(edges, texel, 0).r > 0.5) number = 0;
+#ifdef SHADE_ONCE
+    if (texelFetch(edges, texel, 0).r > 0.5) sample_index = 0;
 #endif
     Surface s;
 #ifdef WRITES_SHADOW_DIFFERENCE
-    shadow_difference = number == 0 ? 1.0 : 0.0;
+    shadow_difference = sample_index == 0 ? 1.0 : 0.0;
 #endif
-    if (!surface_at(texel, number, s)) {
-#ifdef BACKDROP  // comes after
+    if (!surface_at(texel, sample_index, s)) {
+#ifdef BACKDROP  // a later pass draws the environment
         radiance = vec4(0.0);
 #else
         radiance = vec4(background, 0.0);
@@ -52,22 +54,24 @@ void main() {
     }
     if (s.lit > 0.0) {
 #ifdef WRITES_SHADOW_DIFFERENCE
-        int first = number == TEXEL_CENTER ? (texel.x + texel.y) % (DEPTH_SAMPLES / 2) : 0;
+        int first = sample_index == TEXEL_CENTER ? (texel.x + texel.y) % (DEPTH_SAMPLES / 2) : 0;
         for (int i = 0; i < 2; ++i) {
-            float d;
-            int place = i == 0 || number == 0 ? first : opposite(first);
-            shadow_positions[i] = position_at_sample(texel, place, d);
-            shadow_normals[i] = geometric_normal_at(texel, place, shadow_positions[i], d);
+            float window_depth;
+            int shadow_sample = i == 0 || sample_index == 0 ? first : opposite_sample(first);
+            shadow_positions[i] = position_at_sample(texel, shadow_sample, window_depth);
+            shadow_normals[i] = geometric_normal_at(texel, shadow_sample, shadow_positions[i], window_depth);
         }
 #endif
-        ReflectedLight light = direct_lighting(s);
-        ReflectedLight around = environment_lighting(s);
-        radiance = vec4(radiance_of(s, light, around), 1.0);
+        ReflectedLight direct = direct_lighting(s);
+        ReflectedLight environment = environment_lighting(s);
+        radiance = vec4(radiance_of(s, direct, environment), 1.0);
 #ifdef WRITES_SHADOW_DIFFERENCE
-        if (number != 0 && could_reach > 0.0) shadow_difference = min(changing / could_reach, 254.0 / 255.0);
+        if (sample_index != 0 && unshadowed_luminance > 0.0) {
+            shadow_difference = min(luminance_difference / unshadowed_luminance, 254.0 / 255.0);
+        }
 #endif
 #ifdef WRITES_DIFFUSE
-        diffuse = vec4(radiance_of(s, diffuse_only(light), diffuse_only(around)), 1.0);
+        diffuse = vec4(radiance_of(s, diffuse_only(direct), diffuse_only(environment)), 1.0);
 #endif
     } else {
         radiance = vec4(unlit_radiance(s), 1.0);

@@ -1,4 +1,5 @@
-// What is around, in cells of a cube: the mean radiance of each, and where in it the light is, such as a sun.
+// The environment in cells of a cube map: the mean radiance of each cell, and the mean direction of its light, which
+// points at a small bright light such as the sun.
 #include <cube.glsl>
 #include <equirectangular.glsl>
 #include <luminance.glsl>
@@ -6,22 +7,23 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 uniform sampler2D map;  // equirectangular
 uniform writeonly image2DArray cells;
-uniform writeonly image2DArray leaning;
+uniform writeonly image2DArray light_directions;
 
 void main() {
     ivec3 cell = ivec3(gl_GlobalInvocationID);
-    int side = imageSize(cells).x;
-    if (any(greaterThanEqual(cell.xy, ivec2(side)))) return;
-    vec3 sum = vec3(0.0), lean = vec3(0.0);
+    int size = imageSize(cells).x;
+    if (any(greaterThanEqual(cell.xy, ivec2(size)))) return;
+    vec3 radiance_sum = vec3(0.0), direction_sum = vec3(0.0);
     for (int i = 0; i < 4; ++i) {
-        vec2 place = cube_texel_center(2 * cell.xy + ivec2(i & 1, i >> 1), 2 * side);
-        vec3 direction = cube_direction(cell.z, place);
-        vec3 light = equirectangular_radiance(map, direction, sqrt(cube_solid_angle(place, 2 * side)));
-        sum += light;
-        // As places of the face, so that of even light it is the middle; in the dark, too.
-        vec3 away = abs(direction);
-        lean += (luminance_of(light) + 1e-3) * direction / max(away.x, max(away.y, away.z));
+        vec2 position = cube_texel_center(2 * cell.xy + ivec2(i & 1, i >> 1), 2 * size);
+        vec3 direction = cube_direction(cell.z, position);
+        vec3 radiance = equirectangular_radiance(map, direction, sqrt(cube_solid_angle(position, 2 * size)));
+        radiance_sum += radiance;
+        // Directions are scaled to the face, so that uniform light, and darkness, yield the centre of the cell.
+        vec3 magnitude = abs(direction);
+        float major = max(magnitude.x, max(magnitude.y, magnitude.z));
+        direction_sum += (luminance_of(radiance) + 1e-3) * direction / major;
     }
-    imageStore(cells, cell, vec4(0.25 * sum, 1.0));
-    imageStore(leaning, cell, vec4(0.25 * lean, 0.0));
+    imageStore(cells, cell, vec4(0.25 * radiance_sum, 1.0));
+    imageStore(light_directions, cell, vec4(0.25 * direction_sum, 0.0));
 }

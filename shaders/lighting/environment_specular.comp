@@ -1,46 +1,46 @@
-// One level of a prefiltered cube map: the mean of the radiance around each direction over GGX's lobe, seen along the
-// normal and weighted by N.L (Karis 2013). Each sample reads the level of the source whose texels are as large as what
-// the sample stands for (Colbert and Krivanek 2007). All texels take the same samples, so a group works them out once.
+// One level of a prefiltered cube map: radiance averaged over the GGX lobe around each direction, seen along the normal
+// and weighted by NoL (Karis 2013). Each sample reads the mip level whose texels are as large as the solid angle that
+// the sample represents (Colbert and Krivanek 2007). All texels use the same samples, so each group computes them once.
 #include <brdf.glsl>
 #include <cube.glsl>
 #include <hammersley.glsl>
 layout(local_size_x = 8, local_size_y = 8) in;
 
-uniform samplerCube cube;  // the environment, with all its levels
+uniform samplerCube cube;  // the environment, with all mip levels
 uniform float roughness;   // perceptual, above 0
 uniform float level_bias;
 uniform writeonly imageCube specular;
 
-shared vec4 samples[SAMPLES];  // direction about +Z, level; those below the horizon count for nothing
+shared vec4 samples[SAMPLES];  // direction in tangent space, mip level; directions below the horizon are skipped
 
-void work_out_samples() {
+void compute_samples() {
     float alpha = roughness * roughness;
-    float texel = 4.0 * PI / (6.0 * pow(float(textureSize(cube, 0).x), 2.0));
+    float texel_solid_angle = 4.0 * PI / (6.0 * pow(float(textureSize(cube, 0).x), 2.0));
     for (int i = int(gl_LocalInvocationIndex); i < SAMPLES; i += 64) {
         vec3 h = ggx_half_vector(hammersley(i, SAMPLES), alpha);
-        vec3 to_light = vec3(2.0 * h.z * h.xy, 2.0 * h.z * h.z - 1.0);
-        float density = 0.25 * distribution_ggx(h.z, alpha);
-        float level = level_bias + 0.5 * log2(1.0 / (float(SAMPLES) * density * texel));
-        samples[i] = vec4(to_light, max(level, 0.0));
+        vec3 light_dir = vec3(2.0 * h.z * h.xy, 2.0 * h.z * h.z - 1.0);
+        float pdf = 0.25 * distribution_ggx(h.z, alpha);
+        float level = level_bias + 0.5 * log2(1.0 / (float(SAMPLES) * pdf * texel_solid_angle));
+        samples[i] = vec4(light_dir, max(level, 0.0));
     }
     barrier();
 }
 
 void main() {
     ivec3 texel = ivec3(gl_GlobalInvocationID);
-    int side = imageSize(specular).x;
-    vec3 normal = cube_direction(texel.z, cube_texel_center(texel.xy, side));
+    int size = imageSize(specular).x;
+    vec3 normal = cube_direction(texel.z, cube_texel_center(texel.xy, size));
     vec3 sum = vec3(0.0);
-    work_out_samples();
+    compute_samples();
     vec3 tangent = any_tangent(normal);
-    mat3 frame = mat3(tangent, cross(normal, tangent), normal);
+    mat3 tangent_to_world = mat3(tangent, cross(normal, tangent), normal);
     float weights = 0.0;
     for (int i = 0; i < SAMPLES; ++i) {
-        vec4 one = samples[i];
-        if (one.z <= 0.0) continue;
-        sum += textureLod(cube, frame * one.xyz, one.w).rgb * one.z;
-        weights += one.z;
+        vec4 direction = samples[i];
+        if (direction.z <= 0.0) continue;
+        sum += textureLod(cube, tangent_to_world * direction.xyz, direction.w).rgb * direction.z;
+        weights += direction.z;
     }
     sum /= weights;
-    if (all(lessThan(texel.xy, ivec2(side)))) imageStore(specular, texel, vec4(sum, 1.0));
+    if (all(lessThan(texel.xy, ivec2(size)))) imageStore(specular, texel, vec4(sum, 1.0));
 }

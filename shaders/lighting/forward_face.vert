@@ -1,5 +1,5 @@
-// Vertices on their way to the geometry shader.
-#include "face_names.glsl"
+// Transforms vertices for the geometry shader.
+#include "face_varyings.glsl"
 #include <geometry_vertex.glsl>
 
 void main() {

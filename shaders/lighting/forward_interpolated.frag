@@ -1,4 +1,4 @@
-// Light that came from the vertices or the face; textures and shadows at every fragment.
+// Forward lighting with light from the vertices or the face. Textures and shadows are evaluated per fragment.
 #include <pass_view.glsl>
 #include <fragment_surface.glsl>
 #include <radiance.glsl>
@@ -7,27 +7,27 @@
 
 out vec4 radiance;  // scene-linear, premultiplied; alpha is coverage
 #ifdef WRITES_DIFFUSE
-out vec4 diffuse;  // the same without its specular part
+out vec4 diffuse;  // the same without the specular part
 #endif
 
 void main() {
     Surface s = fragment_surface(PASS_VIEW);
-    ReflectedLight light = ReflectedLight(v_diffuse, v_specular);
+    ReflectedLight direct = ReflectedLight(v_diffuse, v_specular);
 #if SHADOW_LIGHT_COUNT > 0
     for (int k = 0; k < SHADOW_LIGHT_COUNT; ++k) {
-        float lit = shadow(shadow_lights[k], s.position, s.geometric_normal);
-        light.diffuse += v_shadowed_diffuse[k] * lit;
-        light.specular += v_shadowed_specular[k] * lit;
+        float light_visibility = shadow(shadow_lights[k], s.position, s.geometric_normal);
+        direct.diffuse += v_shadowed_diffuse[k] * light_visibility;
+        direct.specular += v_shadowed_specular[k] * light_visibility;
     }
 #endif
-    light.diffuse *= s.diffuse;
+    direct.diffuse *= s.diffuse;
 #ifdef HAS_ENVIRONMENT
-    ReflectedLight around = ReflectedLight(v_around_diffuse, v_around_specular);
+    ReflectedLight environment = ReflectedLight(v_environment_diffuse, v_environment_specular);
 #else
-    ReflectedLight around = environment_lighting(s);
+    ReflectedLight environment = environment_lighting(s);
 #endif
-    radiance = vec4(radiance_of(s, light, around) * s.alpha, s.alpha);
+    radiance = vec4(radiance_of(s, direct, environment) * s.alpha, s.alpha);
 #ifdef WRITES_DIFFUSE
-    diffuse = vec4(radiance_of(s, diffuse_only(light), diffuse_only(around)) * s.alpha, s.alpha);
+    diffuse = vec4(radiance_of(s, diffuse_only(direct), diffuse_only(environment)) * s.alpha, s.alpha);
 #endif
 }

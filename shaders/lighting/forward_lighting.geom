@@ -1,4 +1,4 @@
-// Light once a face: at its middle, with the normal of its plane.
+// Lighting once per face: at its centroid, with the normal of its plane.
 layout(triangles) in;
 layout(triangle_strip, max_vertices = 3) out;
 
@@ -36,17 +36,17 @@ centroid out vec4 v_color;
 #endif
 
 void main() {
-    vec3 crossed = cross(g_position[1] - g_position[0], g_position[2] - g_position[0]);
-    vec3 normal = crossed * inversesqrt(max(dot(crossed, crossed), 1e-37));
+    vec3 face_normal = cross(g_position[1] - g_position[0], g_position[2] - g_position[0]);
+    vec3 normal = face_normal * inversesqrt(max(dot(face_normal, face_normal), 1e-37));
     if (dot(normal, g_normal[0] + g_normal[1] + g_normal[2]) < 0.0) normal = -normal;  // a mirrored object
-    vec3 middle = (g_position[0] + g_position[1] + g_position[2]) / 3.0;
-    VertexLight light = vertex_light(g_material[0], middle, normal);
+    vec3 center = (g_position[0] + g_position[1] + g_position[2]) / 3.0;
+    VertexLight light = vertex_light(g_material[0], center, normal);
     for (int i = 0; i < 3; ++i) {
-        v_diffuse = light.rest.diffuse;
-        v_specular = light.rest.specular;
+        v_diffuse = light.unshadowed.diffuse;
+        v_specular = light.unshadowed.specular;
 #ifdef HAS_ENVIRONMENT
-        v_around_diffuse = light.around.diffuse;
-        v_around_specular = light.around.specular;
+        v_environment_diffuse = light.environment.diffuse;
+        v_environment_specular = light.environment.specular;
 #endif
 #if SHADOW_LIGHT_COUNT > 0
         for (int k = 0; k < SHADOW_LIGHT_COUNT; ++k) {

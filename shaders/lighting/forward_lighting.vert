@@ -1,4 +1,4 @@
-// Light at every vertex.
+// Forward lighting, evaluated per vertex.
 #include <geometry_vertex.glsl>
 #include "vertex_light.glsl"
 #define DIRECTION out
@@ -7,11 +7,11 @@
 void main() {
     transform_vertex();
     VertexLight light = vertex_light(v_material, v_position, normalize(v_normal));
-    v_diffuse = light.rest.diffuse;
-    v_specular = light.rest.specular;
+    v_diffuse = light.unshadowed.diffuse;
+    v_specular = light.unshadowed.specular;
 #ifdef HAS_ENVIRONMENT
-    v_around_diffuse = light.around.diffuse;
-    v_around_specular = light.around.specular;
+    v_environment_diffuse = light.environment.diffuse;
+    v_environment_specular = light.environment.specular;
 #endif
 #if SHADOW_LIGHT_COUNT > 0
     for (int k = 0; k < SHADOW_LIGHT_COUNT; ++k) {

@@ -1,13 +1,14 @@
-// Light computed once for a vertex or a face, from the material's factors alone. The diffuse part is light on white,
-// for the fragment to multiply with its texture; lights that cast shadows are kept apart, for it to look those up.
+// Lighting of a vertex or a face, from the material's factors without textures. The diffuse part is for a white
+// surface: fragments multiply it by their diffuse reflectance. Lights with shadows are kept separate, because fragments
+// look up their visibility.
 #include <pass_view.glsl>
 #include <lights.glsl>
 #include <math.glsl>
 #include <environment_lighting.glsl>
 
 struct VertexLight {
-    ReflectedLight around;
-    ReflectedLight rest;  // of lights without shadows
+    ReflectedLight environment;
+    ReflectedLight unshadowed;  // of all lights without shadows
 #if SHADOW_LIGHT_COUNT > 0
     ReflectedLight shadowed[SHADOW_LIGHT_COUNT];
 #endif
@@ -34,30 +35,30 @@ VertexLight vertex_light(int material, vec3 position, vec3 normal) {
     s.diffuse = vec3(1.0);
 
     VertexLight sum;
-    sum.around = environment_lighting(s);
-    sum.rest = ReflectedLight(vec3(0.0), vec3(0.0));
+    sum.environment = environment_lighting(s);
+    sum.unshadowed = ReflectedLight(vec3(0.0), vec3(0.0));
 #if LIGHT_COUNT > 0
 #if SHADOW_LIGHT_COUNT > 0
-    for (int k = 0; k < SHADOW_LIGHT_COUNT; ++k) sum.shadowed[k] = sum.rest;
+    for (int k = 0; k < SHADOW_LIGHT_COUNT; ++k) sum.shadowed[k] = sum.unshadowed;
 #endif
     for (int i = 0; i < LIGHT_COUNT; ++i) {
-        vec3 to_light;
-        vec3 irradiance = irradiance_from(lights[i], position, to_light);
-        ReflectedLight one = shade(s, to_light);
-        one.diffuse *= irradiance;
-        one.specular *= irradiance;
-        bool apart = false;
+        vec3 light_dir;
+        vec3 irradiance = irradiance_from(lights[i], position, light_dir);
+        ReflectedLight light = shade(s, light_dir);
+        light.diffuse *= irradiance;
+        light.specular *= irradiance;
+        bool has_shadow = false;
 #if SHADOW_LIGHT_COUNT > 0
         for (int k = 0; k < SHADOW_LIGHT_COUNT; ++k) {
             if (shadow_lights[k] == i) {
-                sum.shadowed[k] = one;
-                apart = true;
+                sum.shadowed[k] = light;
+                has_shadow = true;
             }
         }
 #endif
-        if (!apart) {
-            sum.rest.diffuse += one.diffuse;
-            sum.rest.specular += one.specular;
+        if (!has_shadow) {
+            sum.unshadowed.diffuse += light.diffuse;
+            sum.unshadowed.specular += light.specular;
         }
     }
 #endif

@@ -1,5 +1,5 @@
-// No light at all: the base colour is shown as it is, by whoever adds the terms up.
+// No lighting: the surface shows its base colour, which `unlit_radiance` returns.
 #pragma needs(nothing)
-ReflectedLight shade(Surface s, vec3 to_light) {
+ReflectedLight shade(Surface s, vec3 light_dir) {
     return ReflectedLight(vec3(0.0), vec3(0.0));
 }

@@ -1,4 +1,4 @@
-// Lets through what is to be marked.
+// Discards texels that are not edges, so that the stencil marks only edges.
 uniform sampler2D edges;
 
 void main() {

@@ -1,4 +1,4 @@
-// Varyings between the vertex and the geometry shader, which hands them on under their own names.
+// Names of the varyings between vertex and geometry shader. The geometry shader passes them on under the usual names.
 #define v_position g_position
 #define v_centroid_position g_centroid_position
 #define v_normal g_normal

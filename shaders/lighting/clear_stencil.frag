@@ -1,0 +1,2 @@
+// Writes no colour; the pass only clears the stencil.
+void main() {}

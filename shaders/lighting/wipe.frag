@@ -1,2 +1,0 @@
-// Nothing but what the fixed function does.
-void main() {}
