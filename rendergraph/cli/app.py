@@ -18,7 +18,12 @@ from rendergraph.cli.output import only_data, print_error, say, set_quiet
 from rendergraph.errors import Interruption, Place, Problem, RendergraphError, suggestion
 from rendergraph.version import __version__
 
-_LISTS = ("nodes", "pipelines", "scenes", "environments")
+_MODULES = {
+    "authoring": ("init", "new-node", "check-node"),
+    "inspection": ("check", "plan", "graph", "config", "diff", "schema"),
+    "lists": ("nodes", "pipelines", "scenes", "environments"),
+}
+"""Modules with several verbs; any other verb is the function `command` of the module of its name."""
 VERBS = (
     "run",
     "view",
@@ -31,7 +36,7 @@ VERBS = (
     "sweep",
     "farm",
     "bench",
-    *_LISTS,
+    *_MODULES["lists"],
     "explain",
     "schema",
     "init",
@@ -39,7 +44,7 @@ VERBS = (
     "check-node",
     "doctor",
 )
-"""In the order of `--help`; verb `x-y` is the function `command` in `rendergraph.cli.x_y`."""
+"""In the order of `--help`."""
 
 _SYNONYMS = {
     "render": "run",
@@ -74,10 +79,9 @@ EXIT_CODES = {
 
 def verb(name: str) -> click.Command:
     """Import a verb and return its command."""
-    if name in _LISTS:
-        found: click.Command = getattr(importlib.import_module("rendergraph.cli.lists"), name)
-    else:
-        found = importlib.import_module(f"rendergraph.cli.{name.replace('-', '_')}").command
+    module = next((module for module, verbs in _MODULES.items() if name in verbs), name)
+    function = "command" if module == name else name.replace("-", "_")
+    found: click.Command = getattr(importlib.import_module(f"rendergraph.cli.{module}"), function)
     return found
 
 

@@ -37,7 +37,7 @@ Entry = dict[str, Any]
 @options.selection_options
 @options.json_option
 def command(topic: str, glsl: bool, pipeline: str | None, step: int | None, select: Select, as_json: bool) -> None:
-    """Explain a node, pipeline, scene, environment, error code or file format.
+    """Explain a node, a pipeline, a scene, a file format or an error.
 
     `pipeline`, `scene`, `sweep`, `settings` and `header` list every key of that kind of file. The path of a file
     explains the pipeline, scene or node in it. With --glsl, TOPIC is a node type, which is shown in a small pipeline,

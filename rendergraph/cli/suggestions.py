@@ -49,14 +49,12 @@ def unknown_option(error: click.NoSuchOption, context: click.Context) -> str:
     name = error.option_name
     if not name.startswith("--"):  # click found only the first letter of `-width`
         name = next((word for word in context.obj or () if word.startswith(name)), name)
-    return f"there is no option '{name}'{_meant(name, context.command)}"
+    return f"there is no option '{name}'{_meant(name, context)}"
 
 
-def _meant(name: str, command: click.Command) -> str:
-    from rendergraph.cli.app import VERBS, verb
-
+def _meant(name: str, context: click.Context) -> str:
     word = name.lstrip("-").partition("=")[0].lower().replace("_", "-")
-    own = _options(command)
+    own = _options(context.command)
     for advice, words in MEANINGS.items():
         if word in words.split():
             known = advice.startswith("rendergraph") or advice.partition(" ")[0] in own
@@ -66,7 +64,10 @@ def _meant(name: str, command: click.Command) -> str:
             return f"; leave it out: {reason}"
     if (near := nearest(word, {option.removeprefix("--") for option in own}, floor=_FLOOR)) is not None:
         return f"; did you mean '--{near}'?"
-    owners = [f"`{owner}`" for owner in VERBS if name in _options(verb(owner))]
+    root = context.find_root()
+    assert isinstance(root.command, click.Group)
+    verbs = {verb: root.command.get_command(root, verb) for verb in root.command.list_commands(root)}
+    owners = [f"`{verb}`" for verb, command in verbs.items() if command and name in _options(command)]
     return f"; it is an option of {', '.join(owners)}" if owners else ""
 
 

@@ -69,7 +69,7 @@ class FakeStages:
         )
 
     def expand(self, linked: Any, options: RenderOptions) -> Any:
-        return SimpleNamespace(linked=linked, options=options, wanted={})
+        return SimpleNamespace(linked=linked, options=options, requests={})
 
     def gpu(self, device: int | None) -> Any:
         self.device = device
@@ -117,10 +117,10 @@ class FakeFrame:
 @pytest.fixture
 def fake(monkeypatch: pytest.MonkeyPatch) -> FakeStages:
     """What `run` goes through in this test."""
-    from rendergraph.session import gpu, stages, wanted
+    from rendergraph.session import gpu, outputs, stages
 
     made = FakeStages()
-    monkeypatch.setattr(wanted, "figures", lambda graph: made.figures)
+    monkeypatch.setattr(outputs, "figures", lambda graph: made.figures)
     for name in ("resolve", "link", "expand", "draw"):
         monkeypatch.setattr(stages, name, getattr(made, name))
     monkeypatch.setattr(gpu, "Gpu", made.gpu)
