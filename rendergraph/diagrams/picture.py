@@ -30,6 +30,7 @@ COLORS = {
 GREY = "#7d8590"
 
 STYLE = """
+svg:root{max-width:100%;height:auto}
 .card{fill:#ffffff;stroke:#7d8590}.head{fill:#e6eaef}.name{fill:#1f2328;font-weight:600;font-size:13px}
 .type{fill:#57606a}.port{fill:#1f2328}.fact{fill:#57606a}.unused{opacity:.5}
 .mark{fill-opacity:.1;stroke-width:2.5}.note{font-weight:600}.pointed{stroke-width:3}

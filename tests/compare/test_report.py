@@ -16,6 +16,7 @@ from rendergraph.compare.engine import compare
 from rendergraph.compare.report import comparison_page
 from rendergraph.compare.report.scatter import Point, scatter_svg
 from rendergraph.compare.results import Comparison
+from rendergraph.diagrams import svg
 
 VOID = {"meta", "link", "img", "input", "path", "rect", "circle", "br"}
 
@@ -179,6 +180,18 @@ def test_no_line_goes_through_a_label() -> None:
 
 
 # --- in a browser ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_a_phone_shows_reports_and_graphs_in_its_width(comparison: Comparison, browser: Any, tmp_path: Path) -> None:
+    assert comparison.base is not None
+    (tmp_path / "report.html").write_text(comparison_page(comparison, "rendergraph compare a b"), encoding="utf-8")
+    (tmp_path / "graph.svg").write_text(svg(comparison.base[1]), encoding="utf-8")
+    page = browser.new_page(viewport={"width": 390, "height": 800})
+    for name in ("report.html", "graph.svg"):
+        page.goto((tmp_path / name).as_uri())
+        assert page.evaluate("document.documentElement.scrollWidth") == 390, name
+    page.close()
 
 
 @pytest.mark.slow
