@@ -209,13 +209,13 @@ class _Compiler(Struct, eq=False, dict=True):
                 content.append((buffer, formats, *wanted))
             names.append(buffer.glo)
         check_attributes(step, program, held, self._texts(step, {}))
-        key = (id(self.memory), "draw", *names, *(layout for layout, _ in step.attributes))
-        vertex_array = self.programs.vertex_array(program, key, content)
+        index = self.memory.buffer(step.indices, parity) if step.indices else None
+        key = (id(self.memory), "draw", index and index.glo, *names, *(layout for layout, _ in step.attributes))
+        vertex_array = self.programs.vertex_array(program, key, content, index)
         mode = _TOPOLOGY[step.topology]
         if isinstance(step.vertices, str):
-            call: Call = partial(
-                vertex_array.render_indirect, self.memory.buffer(step.vertices, parity), mode, 1, first=step.command
-            )
+            indirect, source = vertex_array.render_indirect, self.memory.buffer(step.vertices, parity)
+            call: Call = partial(indirect, source, mode, step.commands, first=step.command)
         else:
             call = partial(vertex_array.render, mode, step.vertices, 0, step.instances)
         compiled.draws.append(Draw(program, uniforms, self._state(step, depth_default=True), call, binds))
@@ -248,7 +248,12 @@ class _Compiler(Struct, eq=False, dict=True):
 
     def _compute(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         program, binds, uniforms = self._program(step, parity, {})
-        call = partial(program.object.run, *groups_of(step, program.local_size, self.device.limits))
+        if isinstance(step.groups, str):
+            call: Call = partial(
+                program.object.run_indirect, self.memory.buffer(step.groups, parity), 12 * step.command
+            )
+        else:
+            call = partial(program.object.run, *groups_of(step, program.local_size, self.device.limits))
         compiled.draws.append(Draw(program, uniforms, None, call, binds))
 
     def _transfer(self, step: Step, compiled: CompiledStep, parity: int) -> None:

@@ -26,7 +26,7 @@ from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
 
 _TAKEN_OVER = frozenset(
     """
-    label state region objects materials order in_place per_light topology command instances groups invocations
+    label state region objects materials order in_place per_light topology command commands instances invocations
     """.split()  # noqa: SIM905 - a list of so many words reads best as text
 )
 """Options of a request that a step has as they are."""
@@ -138,10 +138,11 @@ class _VersionAssignment:
         view, view_index = self._view(recording, request, options)
         self._carry_view(writes, view if request.kind == "geometry" else None)
         size, samples = target_size(self.resources, writes, reads)
-        vertices = options.get("vertices", 3)
-        if isinstance(vertices, Port):
-            reads += self._reads(recording, vertices.name, vertices.whole)
-            vertices = reads[-1].resource
+        counts = {name: options[name] for name in ("vertices", "indices", "groups") if options.get(name) is not None}
+        for name, port in counts.items():
+            if isinstance(port, Port):
+                reads += self._reads(recording, port.name, port.whole)
+                counts[name] = reads[-1].resource
         held: list[tuple[str, str]] = []
         for layout, port in options.get("attributes", {}).items():
             reads += self._reads(recording, port.name, port.whole)
@@ -161,11 +162,11 @@ class _VersionAssignment:
             samples=samples,
             view=view,
             view_index=view_index,
-            vertices=vertices,
             attributes=tuple(held),
             type=node.type.name,
             where=Where(node.place, request.caller),
             if_drawn=_condition_step(recording, options.get("if_drawn", ""), index),
+            **counts,
             **{key: value for key, value in options.items() if key in _TAKEN_OVER},
         )
 

@@ -132,10 +132,11 @@ class Step(Struct, frozen=True, gc=False):
         if_drawn: number of the node's step without whose visible fragments the device skips this one.
         per_light: a light's index if the step draws for one light alone.
         vertices: vertex count of a `draw` step, or the name of the buffer that holds the indirect command.
-        command: which of the commands of that buffer.
+        command, commands: the first of the commands of that buffer, and their number; of `groups` likewise.
+        indices: the name of the buffer that holds the indices; empty without any.
         topology: primitives of a `draw` step; `triangles` or `triangles_adjacency` of a geometry step.
         attributes: for a `draw` step, buffer resource to attribute names with formats (`3f in_position`).
-        groups: work groups of a compute step.
+        groups: work groups of a compute step, or the name of the buffer that holds their number.
         invocations: what a compute step covers along x, y and z, instead of `groups`.
         label: the author's name for it, or a copy's purpose; in plans and timings.
         type: the node's type.
@@ -166,10 +167,12 @@ class Step(Struct, frozen=True, gc=False):
     per_light: int | None = None
     vertices: int | str = 3
     command: int = 0
+    commands: int = 1
+    indices: str = ""
     topology: Topology = "triangles"
     instances: int = 1
     attributes: tuple[tuple[str, str], ...] = ()
-    groups: tuple[int, int, int] = (1, 1, 1)
+    groups: tuple[int, int, int] | str = (1, 1, 1)
     invocations: tuple[int, int, int] | None = None
     label: str = ""
     type: str = ""

@@ -11,7 +11,7 @@ from msgspec import Struct, field
 
 from rendergraph.errors import Misuse, is_framework
 from rendergraph.facts import Facts, LightFacts
-from rendergraph.ports import Count, InOut, Input, Output, Part, Port, Shader, Texel, Views
+from rendergraph.ports import Count, InOut, Input, Output, Part, Port, Positive, Shader, Texel, Views
 from rendergraph.steps import checks
 from rendergraph.steps.checks import Counts, Macro, checked
 from rendergraph.steps.model import DrawOrder, MaterialLevel, Topology, UniformValue
@@ -136,6 +136,12 @@ class Steps:
             raise Misuse(f"'{own.name}' holds no texture; its description has no size or format")
         return found
 
+    def _check_buffers(self, **arguments: object) -> None:
+        for name, port in arguments.items():
+            if isinstance(port, Port):
+                checks.buffer(checks.declared_port(self.ports, port, name), name)
+                self._connected(port)
+
     def _connected(self, port: Port) -> None:
         if isinstance(port, Input) and not self.facts.connected(port.name):
             raise checks.unconnected(port)
@@ -226,6 +232,8 @@ class Steps:
         vertex: Shader,
         vertices: Count | Port,
         command: Count = 0,
+        commands: Positive = 1,
+        indices: Port | None = None,
         attributes: Mapping[str, Port] | None = None,
         geometry: Shader | None = None,
         topology: Topology = "triangles",
@@ -244,25 +252,27 @@ class Steps:
         Args:
             fragment, vertex, geometry: shaders.
             vertices: a count, or a buffer port with indirect draw commands: four 32-bit integers (count, instances,
-                first, base instance) and one that is ignored.
-            command: which of those commands, from 0.
+                first, base instance) and one that is ignored; five with `indices` (count, instances, first index, base
+                vertex, base instance).
+            command, commands: the first of those commands, from 0, and their number. An earlier step may write fewer:
+                a command that is all 0 draws nothing.
+            indices: a buffer port of 32-bit indices.
             attributes: layout to buffer port, the layout as `3f 2f in_position in_uv`; with `/i` after the formats
                 (`4f/i in_color`) they advance per instance.
             topology, instances: as in OpenGL.
             out, state, region, defines, label, bindings: see the class.
             view, view_index: as for `geometry`.
         """
-        if isinstance(vertices, Port):
-            checks.buffer(checks.declared_port(self.ports, vertices, "vertices"), "vertices")
-            self._connected(vertices)
-        else:
+        if not isinstance(vertices, Port):
             checks.check_argument("vertices", vertices, Count)
+        self._check_buffers(vertices=vertices, indices=indices)
         buffers = checks.attributes(self.ports, attributes)
         for port in buffers.values():
             self._connected(port)
         shaders = {"vertex": vertex, "geometry": geometry, "fragment": fragment}
         target = {"label": label, "state": state, "region": region, "view": view, "view_index": view_index}
-        source = {"vertices": vertices, "command": command, "topology": topology, "instances": instances}
+        source = {"vertices": vertices, "command": command, "commands": commands, "indices": indices}
+        source |= {"topology": topology, "instances": instances}
         self._add("draw", shaders, out, bindings, defines, **target, **source, attributes=buffers)
 
     @checked
@@ -271,7 +281,8 @@ class Steps:
         shader: Shader,
         *,
         over: Target | Counts | None = None,
-        groups: Counts | None = None,
+        groups: Counts | Port | None = None,
+        command: Count = 0,
         out: Target | Mapping[str, Target] | None = None,
         defines: Defines | None = None,
         label: str = "",
@@ -285,12 +296,16 @@ class Steps:
                 default the first texture that it writes, else the first that it reads. The last work groups may reach
                 beyond
                 the edge: the shader skips those invocations.
-            groups: the number of work groups instead.
+            groups: the number of work groups instead, or a buffer port that holds it: three 32-bit integers.
+            command: which of those triples, from 0.
             out, defines, label, bindings: see the class.
         """
         if groups is not None and over is not None:
             raise Misuse("both over and groups are given; over finds the number of groups itself")
-        options = {"over": over} if groups is None else {"groups": checks.counts(groups)}
+        self._check_buffers(groups=groups)
+        options: dict[str, Any] = {"over": over}
+        if groups is not None:
+            options = {"groups": groups if isinstance(groups, Port) else checks.counts(groups), "command": command}
         self._add("compute", {"compute": shader}, out, bindings, defines, label=label, **options)
 
     def clear(self, out: Target, value: float | tuple[float, ...] = 0.0) -> None:
