@@ -54,12 +54,16 @@ class ArmOcclusion(ScreenSpaceOcclusion):
         """
         screen, sizes = self.screen(steps), self.sizes(steps)
         macros = {**(defines or {}), **({"FOUR": 1} if four else {})}
+        mean = "neighbours_mean.frag"
+        if smooth and "occlusion" not in out:  # the filter takes the noise of light alone
+            mean = "even_mean.frag"
+            macros["BLOCKS"] = 1 << smooth - 1  # as many blocks of 4×4 pixels as the filter averages along each axis
         found, small = (self.unfiltered_four, self.neighbours_four) if four else (self.unfiltered, self.neighbours)
         self.gather_surfaces(steps)
         steps.fullscreen(
             fragment, out=found, surfaces=self.surfaces, screen=screen, defines={**macros, **sizes}, **reads
         )
-        passes: list[tuple[str, dict[str, Any]]] = [("neighbours_mean.frag", {"unfiltered": found})]
+        passes: list[tuple[str, dict[str, Any]]] = [(mean, {"unfiltered": found})]
         for number in range(smooth):
             source = found if number % 2 else small
             reach = {"stride": 2 << number, "tolerance": self.tolerance()}

@@ -14,10 +14,24 @@
 #define ARMS (SAMPLES / STEPS / 2 * 2)
 #endif
 
+#ifdef BLOCKS
+// Blocks of 4×4 pixels differ too, in a pattern of BLOCKS × BLOCKS (a power of two), so that a filter over many blocks
+// averages other samples in each: otherwise a small bright surface that one block misses, all around it miss as well.
+
+// The rank of a block in a pattern of `size` × `size`, 0 to 1: all different, and evenly spaced.
+float block_rank(ivec2 block, int size) {
+    int sum = block.x + block.y & size - 1;
+    return (float(sum * size + (block.x & size - 1)) + 0.5) / float(size * size);
+}
+#endif
+
 // Unit vector of this pixel's arm 0 of `arms` on the screen.
 vec2 first_arm(int arms) {
     ivec2 texel = ivec2(gl_FragCoord.xy);
     float turn = float((texel.x + texel.y & 3) << 2 | texel.x & 3) + 0.5;
+#ifdef BLOCKS
+    turn += block_rank(texel >> 2, BLOCKS) - 0.5;
+#endif
 #if ANIMATED
     turn = 16.0 * fract(turn / 16.0 + 0.618034 * float(frame_index & 1023));
 #endif
@@ -29,6 +43,9 @@ vec2 first_arm(int arms) {
 float stretch_of(int arm) {
     ivec2 texel = ivec2(gl_FragCoord.xy);
     float stretch = float((texel.y - texel.x & 3) << 2 | texel.y & 3) + 0.5;
+#ifdef BLOCKS
+    stretch += 16.0 * block_rank((texel >> 2).yx * ivec2(1, -1), BLOCKS);
+#endif
 #if ANIMATED
     stretch += 16.0 * 0.754878 * float(frame_index & 1023);
 #endif

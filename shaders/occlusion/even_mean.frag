@@ -1,5 +1,5 @@
-// The mean of what the 4×4 pixels around have found, for a picture that is interpolated: its middle is the pixel, so
-// that a slope stays one, where `neighbours_mean.frag` makes stairs of it. Two by two pixels hold what they share: of
+// The mean of what the 4×4 pixels around have found, for a picture that is interpolated or filtered further: its middle
+// is the pixel, so that a slope stays one, where `neighbours_mean.frag` makes stairs of it. Two by two pixels hold what they share: of
 // nine such quads the middle one counts half along each axis, the nearer neighbour three eighths, the farther one the
 // rest. All four pixels of a quad need the same nine, so each looks three up and has the others from them.
 #include "surfaces.glsl"
@@ -11,12 +11,13 @@ uniform ivec2 screen;
 uniform float radius;  // metres
 
 Seen seen_at(View v, ivec2 pixel, ivec2 size) {
-    ivec2 inside = clamp(pixel, ivec2(0), reduced - 1);
+    ivec2 target = target_size(size);
+    ivec2 inside = clamp(pixel, ivec2(0), target - 1);
     ivec2 texel = surface_of(inside, size);
     vec4 surface = look_up(surfaces, texel, size);
     vec3 normal = inside == pixel ? surface.xyz : vec3(0.0);
     return Seen(view_position(v, place_for(texel, size, screen), surface.w), normal,
-                look_up(unfiltered, inside, reduced).PARTS);
+                look_up(unfiltered, inside, target).PARTS);
 }
 
 void add(inout Value sum, inout float total, Seen here, Seen there, float share, float tolerance) {
