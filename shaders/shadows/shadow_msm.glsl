@@ -19,9 +19,12 @@ float share_before(vec4 b, float t) {
     c.z = (c.z - skew / variance * c.y) * variance / rest;
     c.y = (c.y - skew * c.z) / variance;
     c.x -= b.x * c.y + b.y * c.z;
-    float middle = -0.5 * c.y / c.z;
-    float apart = sqrt(max(middle * middle - c.x / c.z, 0.0));
-    vec2 zeros = vec2(middle - apart, middle + apart);
+    // Without cancellation, and with the second root at a large distance where the polynomial is nearly linear.
+    float root = sqrt(max(c.y * c.y - 4.0 * c.x * c.z, 0.0));
+    float q = -0.5 * (c.y + (c.y < 0.0 ? -root : root));
+    float first = clamp(q / c.z, -1e4, 1e4);
+    float second = c.x / q;
+    vec2 zeros = vec2(min(first, second), max(first, second));
     if (t <= zeros.x) return 0.0;
     if (t <= zeros.y) {  // only the first lies before t: its share
         return (t * zeros.y - b.x * (t + zeros.y) + b.y) / ((zeros.y - zeros.x) * (t - zeros.x));

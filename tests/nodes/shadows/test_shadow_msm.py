@@ -45,6 +45,15 @@ def test_two_surfaces_are_told_apart_exactly(glsl_function: Callable[..., float]
             assert found == pytest.approx(expected, abs=0.02)
 
 
+@pytest.mark.parametrize("t", [0.5, 0.5 + 1e-7, -0.5])
+def test_two_points_suffice_where_the_polynomial_is_linear(glsl_function: Callable[..., float], t: float) -> None:
+    """Then the third point is infinitely far and has no weight; dividing by its coefficient left black pixels."""
+    found = glsl_function(
+        "shadow_msm.glsl", "share_before", f"share_before(vec4(0, 0.25, 0, 0.125), {t})", moment_bias=0.0
+    )
+    assert found == pytest.approx(0.5 if t > 0 else 0, abs=1e-3)
+
+
 @pytest.mark.slow
 def test_it_bleeds_less_than_variance(look: Any, boxed: Any, bilinear: Any) -> None:
     """Against the mean of the tests themselves, on the floor under the knot: nearer to it than two moments are."""
