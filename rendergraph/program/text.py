@@ -192,7 +192,8 @@ class _Program(Struct, frozen=True):
                 functions += generated(table, f"the lights of {signature.name}()")
         if functions.blocks:  # which may include what it includes
             source = expanded(includes)
-        if any(use.use == "image" for use in (*step.reads, *step.writes)):
+        uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
+        if any(use.use == "image" for use in uses):
             from rendergraph.program.images import with_formats  # many pipelines have no images
 
             source = with_formats(source, step, self.resources)

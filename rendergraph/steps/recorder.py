@@ -272,8 +272,8 @@ class Steps:
         shaders = {"vertex": vertex, "geometry": geometry, "fragment": fragment}
         target = {"label": label, "state": state, "region": region, "view": view, "view_index": view_index}
         source = {"vertices": vertices, "command": command, "commands": commands, "indices": indices}
-        source |= {"topology": topology, "instances": instances}
-        self._add("draw", shaders, out, bindings, defines, **target, **source, attributes=buffers)
+        shape = {"topology": topology, "instances": instances, "attributes": buffers}
+        self._add("draw", shaders, out, bindings, defines, **target, **source, **shape)
 
     @checked
     def compute(
