@@ -90,7 +90,8 @@ TEXT = "nodes: {a: {type: chosen}}\noutputs: {image: a.color}"
 @pytest.mark.parametrize("first", [0, 12])
 def test_a_shader_decides_how_much_is_dispatched_and_drawn(bench: Any, gl: rg.Session, first: int) -> None:
     pipeline = bench.pipeline(TEXT, Chosen, shaders=SHADERS).set("a.first", first)
-    for mode in ({}, {"poison": True, "shuffle": 2}):
+    modes: tuple[dict[str, Any], ...] = ({}, {"poison": True, "shuffle": 2})
+    for mode in modes:
         frame = gl.render(pipeline, outputs=["image"], taps=["a.heights"], frames=range(1, 3), **mode)
         kept = np.arange(first, 16, 2)
         heights = frame["a.heights"].view(np.uint32)

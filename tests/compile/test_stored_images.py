@@ -37,8 +37,7 @@ class Histogram(Node):
     marks = Output(AnyTexel, format="r32f", clear=0, doc="1 at bright pixels.")
 
     def record(self, steps: Steps) -> None:
-        out = {"color": self.color, "bins": self.bins, "marks": self.marks.stored()}
-        steps.fullscreen("histogram.frag", out=out)
+        steps.fullscreen("histogram.frag", out={"color": self.color, "bins": self.bins, "marks": self.marks.stored()})
 
 
 class Copy(Node):

@@ -306,7 +306,7 @@ def test_a_buffer_keeps_last_frames_values(bench: Any) -> None:
     )
     for number, frame in enumerate(frames, 1):
         rows, columns = np.nonzero(frame["image"][::-1, :, 0])
-        assert set(zip(columns, rows, strict=True)) == {(number, 0), (number, number)}
+        assert set(zip(columns.tolist(), rows.tolist(), strict=True)) == {(number, 0), (number, number)}
         assert frame["image"].max() == number
 
 
