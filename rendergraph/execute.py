@@ -83,7 +83,7 @@ class FrameContext(Struct, eq=False):
 
     def set_views(self, port: Views, views: Sequence[ViewMatrices]) -> None:
         if not isinstance(declared_port(self.node.node.ports(), port, "set_views"), Views):
-            raise Misuse(f"set_views is given '{port.name}', which is no Views port", "RG433")
+            raise Misuse(f"set_views is given '{port.name}', which is not a Views port", "RG433")
         for view in views:
             if not isinstance(view, ViewMatrices):
                 raise Misuse(f"set_views is given {type(view).__name__}, not ViewMatrices", "RG433")

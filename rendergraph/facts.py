@@ -51,7 +51,7 @@ def casting_lights(wanted: str | Sequence[str], lights: Sequence[Any]) -> tuple[
     found = set()
     for name in [wanted] if isinstance(wanted, str) else wanted:
         if name not in names:
-            hint = suggestion(name, names, most=len(names)) or "; there is no light"
+            hint = suggestion(name, names, most=len(names)) or "; there are no lights"
             raise SceneError(f"the scene has no light '{name}'{hint}", name)
         found.add(names.index(name))
     return tuple(sorted(found))

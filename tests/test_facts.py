@@ -45,7 +45,7 @@ def test_auto_takes_a_spot_light_where_no_directional_one_casts_then_a_point_lig
 def test_a_light_that_is_not_there() -> None:
     with pytest.raises(SceneError, match="the scene has no light 'kye'; did you mean 'key'"):
         casting_lights("kye", LIGHTS)
-    with pytest.raises(SceneError, match="the scene has no light 'sun'; there is no light"):
+    with pytest.raises(SceneError, match="the scene has no light 'sun'; there are no lights"):
         casting_lights("sun", ())
 
 

@@ -276,7 +276,7 @@ class Entries:
         if texel.is_depth:
             fix = "leave that out, and write gl_FragDepth"
         elif prefix != (found.type[0] if found.type[0] in "iu" and not found.type.startswith("image") else ""):
-            fix = f"a {texel.family} format takes {prefix}vec4" if prefix else "that format takes float to vec4"
+            fix = f"a {texel.family} format needs {prefix}vec4" if prefix else "that format needs float to vec4"
         else:
             return True
         text = f"format {texel.name} is incompatible with '{found.storage} {found.type} {found.name}'; {fix}"

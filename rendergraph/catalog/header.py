@@ -110,7 +110,11 @@ INPUT = Table(
     (
         _DOC,
         Key("semantic", word(_NAME, "a word"), "What it must mean; of a function its name.", "any"),
-        Key("kind", choice("function", "view"), "For what is no texture; the sampler's by default."),
+        Key(
+            "kind",
+            choice("function", "view"),
+            "Where it is not a texture; the sampler's by default.",
+        ),
         Key("optional", bool, "It may stay unconnected, and the text goes without `HAS_<NAME>`.", False),
         Key("many", bool, "It takes a list, as `name_0`, `name_1`, ….", False),
         Key("size", choice("same", "any"), "Whether it is as large as the target.", "same"),
@@ -151,7 +155,7 @@ PARAM = Table(
         Key("min", NUMBER, "Least value, of each component."),
         Key("max", NUMBER, "Greatest value, of each component."),
         Key("role", choice("param", "define", "structural"), "A uniform, compiled in as `NAME`, or part of the plan."),
-        Key("choices", listed(word(_NAME, "a word"), "words", 1), "The words it may be, where it is no uniform."),
+        Key("choices", listed(word(_NAME, "a word"), "words", 1), "The words it may be, where it is not a uniform."),
     ),
 )
 HEADER = Table(

@@ -32,8 +32,8 @@ def _samples(plan: ResourcePlan, limits: Mapping[str, int]) -> Iterator[Problem]
             kind = "integer_" if family in ("int", "uint") else "depth_" if "depth" in family else ""
             most = limits[f"{kind}samples"]
             if desc.samples > most:
-                text = f"'{write.resource}' has {desc.samples} samples a texel, which is more than this device's {most}"
-                yield Problem("RG435", text, step.where.place)
+                text = f"'{write.resource}' has {desc.samples} samples per texel"
+                yield Problem("RG435", f"{text}, which is more than this device's {most}", step.where.place)
 
 
 def _excesses(
@@ -67,7 +67,7 @@ def _excesses(
             ("images", images, limits["images"]),
         ):
             if value > most:
-                yield step.problem("RG435", f"it has {value} {words}; this device takes {most}")
+                yield step.problem("RG435", f"it has {value} {words}; this device supports {most}")
         if step.state.depth_bounds is not None and not device.has_depth_bounds:
             text = "its `State` has depth bounds, which this device lacks; `rendergraph doctor` says more"
             yield step.problem("RG435", text)
@@ -83,7 +83,7 @@ def groups_of(step: Step, local: tuple[int, int, int], limits: Mapping[str, int]
     most = limits["groups_x"], limits["groups_y"], limits["groups_z"]
     if any(count > limit for count, limit in zip(groups, most, strict=True)):
         text = (
-            f"it has {' × '.join(map(str, groups))} work groups; this device takes {' × '.join(map(str, most))}, "
+            f"it has {' × '.join(map(str, groups))} work groups; this device supports {' × '.join(map(str, most))}, "
             "larger groups (`layout(local_size_x = …)`) make fewer of them"
         )
         raise RenderError(step.problem("RG435", text))

@@ -18,6 +18,7 @@ from rendergraph.textures import Semantic, Signature
 from rendergraph.typecheck import accepts, mistakes_in, mistakes_of, parts_of, quoted
 
 _IDENTIFIER = re.compile(r"[a-z][a-z0-9_]*\Z")
+_MACRO = re.compile(r"[A-Za-z0-9_-]+")
 
 _OF_THE_BASE = frozenset(name for name in vars(Node) if not name.startswith("_"))
 
@@ -145,10 +146,10 @@ def _alone(name: str, port: Port) -> Iterator[str]:
             yield f"port '{name}' has neither a semantic nor `like`"
         if port.kind != "buffer":
             if port.bytes != 0:
-                yield f"port '{name}' has bytes={quoted(port.bytes)}, but is no buffer; say kind='buffer'"
+                yield f"port '{name}' has bytes={quoted(port.bytes)}, but is not a buffer; add kind='buffer'"
             return
         if port.bytes == 0:
-            yield f"port '{name}' is a buffer without bytes; say bytes=…, from 1 up"
+            yield f"port '{name}' is a buffer without bytes; add bytes=…, from 1 up"
         if port.first not in (None, 0):
             yield f"port '{name}' is a buffer, which holds 0 before the first frame, not {port.first!r}"
         if not callable(port.clear) and port.clear not in (None, 0):
@@ -157,24 +158,21 @@ def _alone(name: str, port: Port) -> Iterator[str]:
 
 def _named(name: str, port: Port, ports: Mapping[str, Port]) -> Iterator[str]:
     """Mistakes in the names of other ports."""
-    inputs, viewed = (Input, InOut), (Input, InOut, Views)
-    made = isinstance(port, WrittenPort)
-    size = (port.size[0] if isinstance(port.size, tuple) else port.size) if isinstance(port, WrittenPort) else None
-    needs = port.needs if isinstance(port, Output | Function) else ()
-    reads = port.read_names if isinstance(port, Function) else ()
-    named: list[tuple[str, object, tuple[type[Port], ...], str]] = [
-        ("is like", getattr(port, "like", None), inputs, "no input"),
-        ("is view", getattr(port, "view", None), viewed, "no input and no table of views"),
-        ("is lights", getattr(port, "lights", None) if made else None, viewed, "no input and no table of views"),
-        ("has the size of", size, inputs, "no input"),
-        *(("needs", target, inputs, "no input") for target in needs),
-        *(("reads", target, (Input, WrittenPort), "no texture and no buffer") for target in reads),
-    ]
-    for rule, target, kinds, otherwise in named:
+    inputs, viewed, sampled = (Input, InOut), (Input, InOut, Views), (Input, WrittenPort)
+    named: list[tuple[str, object, tuple[type[Port], ...], str]] = []
+    if isinstance(port, WrittenPort):
+        size = port.size[0] if isinstance(port.size, tuple) else port.size
+        named += [("like", port.like, inputs, "an input"), ("size", size, inputs, "an input")]
+        named += [(key, getattr(port, key), viewed, "an input or a Views port") for key in ("view", "lights")]
+    if isinstance(port, Output | Function):
+        named += [("needs", target, inputs, "an input") for target in port.needs]
+    if isinstance(port, Function):
+        named += [("reads", target, sampled, "a texture or buffer") for target in port.read_names]
+    for key, target, kinds, expected in named:
         if isinstance(target, str) and target not in ports:
-            yield f"port '{name}' {rule} '{target}', which is no port{suggestion(target, ports, most=0)}"
+            yield f"port '{name}': {key}: there is no port '{target}'{suggestion(target, ports, most=0)}"
         elif isinstance(target, str) and not isinstance(ports[target], kinds):
-            yield f"port '{name}' {rule} '{target}', which is {otherwise}"
+            yield f"port '{name}': {key}: '{target}' is not {expected}"
 
 
 def _macros(cls: type[Node]) -> Iterator[Problem]:
@@ -211,12 +209,12 @@ def _parameters(cls: type[Node]) -> Iterator[Problem]:
             yield _problem(name, f"parameter '{name}' is {wrong}")
         if parameter.unless and not any(parameter.unless in vars(base) for base in cls.__mro__):  # it may be dropped
             hint = suggestion(parameter.unless, cls.inputs())
-            yield _problem(name, f"parameter '{name}' has unless='{parameter.unless}', which is no input{hint}")
+            yield _problem(name, f"parameter '{name}': unless: there is no input '{parameter.unless}'{hint}")
         wrong_limits = list(_limits(parameter))
         yield from wrong_limits
         sound = sound and not wrong_limits
         if parameter.glsl and not re.fullmatch(r"(float|int|uint|bool|[biu]?vec[234]|mat[234])", str(parameter.glsl)):
-            yield _problem(name, f"parameter '{name}' has glsl={parameter.glsl!r}, which is no GLSL type")
+            yield _problem(name, f"parameter '{name}': glsl: {parameter.glsl!r} is not the GLSL type of a parameter")
     if sound:
         yield from _defaults(cls)
 
@@ -251,24 +249,17 @@ def _defaults(cls: type[Node]) -> Iterator[Problem]:
         yield _problem("", f"it cannot be instantiated with its defaults: {describe_error(error)}")
 
 
-def _not_for_a_shader(parameter: Parameter) -> str | None:
+def _not_for_a_shader(parameter: Parameter) -> str:
     """Why a parameter's type cannot become a uniform, or program text."""
-    role, kinds = parameter.role, [get_origin(part) or part for part in parts_of(parameter.type)]
-    if role == "define":
-        odd = [word for word in parameter.words if not re.fullmatch(r"[A-Za-z0-9_-]+", word)]
-        if odd:
-            return f"a define with the choice '{odd[0]}', which cannot stand in a macro's name"
-        if list in kinds or accepts(parameter.type, tuple):
-            return "a define of several numbers; macros hold one, make it a param"
-        if str in kinds and not parameter.open_name:
-            return "a define of free text; list its choices as Literal[…]"
-    elif str in kinds or parameter.words:
-        return "a param of text, which no uniform holds; make it a define with Literal[…]"
-    if type(None) in kinds:
-        return f"a {role} that may be None; give it a default"
-    if list in kinds:
-        return f"a {role} of a list; a tuple says how many numbers there are"
-    other = [kind for kind in kinds if kind not in (bool, int, float, str, Literal)]
-    if other:
-        return f"a {role} of {getattr(other[0], '__name__', other[0])}; shaders take numbers and switches"
-    return None
+    kinds = {get_origin(part) or part for part in parts_of(parameter.type)}
+    if parameter.role == "param":
+        if kinds <= {bool, int, float, Literal} and not parameter.words:
+            return ""
+        return (
+            "a param, so its type is a number, a switch or a tuple of them; make text a define with its choices as "
+            "Literal[…]"
+        )
+    fits = kinds <= {bool, int, float, Literal, *([str] if parameter.open_name else [])}
+    if fits and not accepts(parameter.type, tuple) and all(map(_MACRO.fullmatch, parameter.words)):
+        return ""
+    return "a define, so its type is one number, a switch, or Literal[…] with words of letters, digits, '_' and '-'"

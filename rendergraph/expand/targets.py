@@ -112,7 +112,7 @@ def image_refusal(touched: Read | Write, resource: Resource | None) -> str | Non
     fmt = FORMATS[desc.format]
     if not (fmt.is_depth or fmt.srgb or desc.samples > 1):
         return None
-    what = f"{desc.samples} samples a texel" if desc.samples > 1 else f"the format {desc.format}"
+    what = f"{desc.samples} samples per texel" if desc.samples > 1 else f"the format {desc.format}"
     return f"it cannot {word} '{touched.resource}' as an image, as it has {what}"
 
 
@@ -124,7 +124,7 @@ def _difference(own: _Extent, other: _Extent) -> str:
     if own[:2] != other[:2]:
         words.append(f"{own[0]}×{own[1]}")
     if own[2] != other[2]:
-        words.append(f"{own[2]} samples a texel" if own[2] > 1 else "not multisampled")
+        words.append(f"{own[2]} samples per texel" if own[2] > 1 else "not multisampled")
     if own[3] != other[3]:
         words.append(f"{own[3]} layers" if own[3] else "a plain 2D target")
     return ", ".join(words)

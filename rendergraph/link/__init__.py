@@ -240,7 +240,7 @@ class _Linker(Struct, eq=False):
                 if entered.semantic == carried:
                     continue
                 where = line_of(nodes[found.source.node].spec.place, entered.given.place)
-                text = f"'{entered.name}' takes {entered.semantic}, but '{found.source}' ({where}) carries {carried}"
+                text = f"'{entered.name}' expects {entered.semantic}, but '{found.source}' ({where}) is {carried}"
                 added = [added.value for added in self.catalog.extensions.semantics()]
                 known = [semantic.name for semantic in (*SEMANTICS, *added)]
                 text += "" if entered.semantic in known else suggestion(entered.semantic, known, most=0)

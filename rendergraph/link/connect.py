@@ -106,7 +106,7 @@ class Connector(Struct, eq=False):
                     lacking += [] if optional else [name]
             if lacking:
                 listed = ", ".join(f"'{name}'" for name in lacking)
-                text = f"'{draft.spec.id}.{group}' takes a node with {listed}, which '{node}' lacks"
+                text = f"'{draft.spec.id}.{group}' expects a node with {listed}, which '{node}' lacks"
                 self.report(value.problem("RG112", f"{text}; link {listed} beside the group"))
             if offered and not lacking:
                 return
@@ -128,4 +128,4 @@ class Connector(Struct, eq=False):
                 if wanted is not None and meant is not None and (meant.name, kind) == (wanted.name, port.kind):
                     return f"; '{other.id.removeprefix(other.scope)}.{name}' would fit"
         what = f"{wanted.name}()" if isinstance(wanted, Signature) else wanted.name if wanted else "anything"
-        return f"; it takes {what}"
+        return f"; it expects {what}"

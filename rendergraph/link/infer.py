@@ -285,7 +285,7 @@ class TextureInference:
         if mips > full:
             self._stop(end, "RG208", f"a texture of {size[0]}×{size[1]} has 1 to {full} mips, not {mips}")
         if samples > 1 and (mips > 1 or kind in ("texture3d", "texture_cube")):
-            self._stop(end, "RG208", f"a texture cannot have {samples} samples a texel with mips, in 3D or in a cube")
+            self._stop(end, "RG208", f"a texture cannot have {samples} samples per texel with mips, in 3D or in a cube")
         return TextureDesc(kind, name, *size, layers=layers, mips=mips, samples=samples)
 
     def _samples_of(self, draft: UnlinkedNode, like: TextureDesc | None, size: tuple[int, int]) -> int:

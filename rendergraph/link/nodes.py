@@ -149,7 +149,7 @@ class References(Struct, eq=False):
                 return None
             raise InputError(())  # said at the node
         if isinstance(given.data, list):
-            text = f"input '{port}' of sub-pipeline '{scope[:-1]}' takes one link"
+            text = f"'{scope[:-1]}.{port}': expected one link as in node.port, got a list"
             raise InputError(given.problem("RG113", text))
         link = self._reference(found.parent, given, port, depth + 1)
         if link is None:

@@ -69,7 +69,7 @@ def _mismatch(match: re.Match[str], use: Read | Write, desc: TextureDesc) -> str
     wanted = f"{letter}image{'2D' if use.layer is not None else GLSL_SHAPES[desc.kind]}"
     name = match["name"]
     if match["type"] != wanted:
-        return f"image '{name}' is an {match['type']}, but '{use.resource}' is {desc.format}, which takes {wanted}"
+        return f"image '{name}' is an {match['type']}, but '{use.resource}' is {desc.format}, which needs {wanted}"
     stated = _stated(match)
     if stated is not None and stated != desc.format:
         return f"image '{name}' has layout({stated}), but '{use.resource}' is {desc.format}; leave the layout out"

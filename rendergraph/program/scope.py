@@ -159,7 +159,7 @@ class _Scope:
             by = [one.node for one in self.step.functions if one.signature == signature.name]
             by = [f"node '{node}'" for node in by]
             by += [f"texture '{read.name}'" for read in screen_reads(signature, self.step, self.types[self.step.node])]
-            given = " and ".join(by) or f"nobody here; it returns {signature.neutral}"
+            given = " and ".join(by) or f"no node of this pipeline; it returns {signature.neutral}"
             yield InScope("functions", signature.declaration, given)
 
     def includes(self, texts: Mapping[str, StageText]) -> Iterator[InScope]:

@@ -265,7 +265,7 @@ def patch_of(tree: Value, wanted: Sequence[Setting], names_of: NamesOf) -> tuple
             text = f"node '{setting.node}' ({word}) has no param or input '{setting.name}'"
             problems.append(setting.problem("RG103", text + suggestion(setting.name, choices)))
         elif part == "inputs" and not _is_link(setting.value):
-            text = f"'{setting.text}' takes a link as in 'node.port', a list of links, or null"
+            text = f"'{setting.text}': expected a link as in 'node.port', a list of links, or null"
             problems.append(setting.problem("RG106", text))
         else:
             _put(root, setting.value, "nodes", setting.node, part, setting.name)

@@ -311,7 +311,7 @@ def test_a_meaning_in_a_node_and_in_a_sub_pipeline(write: Write, tmp_path: Path,
     if said == "heat":
         pipeline.link()
         return
-    with pytest.raises(InputError, match=r"'cellar\.x' takes het, but .* carries heat; did you mean 'heat'\?"):
+    with pytest.raises(InputError, match=r"'cellar\.x' expects het, but .* is heat; did you mean 'heat'\?"):
         pipeline.link()
 
 

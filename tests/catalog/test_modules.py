@@ -163,7 +163,7 @@ def test_none_that_drops_nothing_is_a_mistake(plugin: Path) -> None:
 
 def test_a_port_that_others_refer_to_is_not_dropped_alone(plugin: Path) -> None:
     (plugin / "hard_shadows.py").write_text(HARD.replace("    visibility = DROPPED\n", ""))
-    with pytest.raises(InputError, match="port 'visibility' needs 'depth', which is no port"):
+    with pytest.raises(InputError, match="port 'visibility': needs: there is no port 'depth'"):
         Catalog.discover([plugin], installed=False).get("hard_shadows")
 
 

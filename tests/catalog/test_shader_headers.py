@@ -380,12 +380,12 @@ CONTRADICTIONS = {
     "whole numbers as a vec4": (
         "outputs: {c: {format: rgba32ui}}",
         "out vec4 c;",
-        "2:23: RG444 format rgba32ui is incompatible with 'out vec4 c'; a uint format takes uvec4",
+        "2:23: RG444 format rgba32ui is incompatible with 'out vec4 c'; a uint format needs uvec4",
     ),
     "a uvec4 as fractions": (
         "outputs: {c: {format: rgba8}}",
         "out uvec4 c;",
-        "2:23: RG444 format rgba8 is incompatible with 'out uvec4 c'; that format takes float to vec4",
+        "2:23: RG444 format rgba8 is incompatible with 'out uvec4 c'; that format needs float to vec4",
     ),
 }
 

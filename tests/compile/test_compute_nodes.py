@@ -158,7 +158,7 @@ def test_more_groups_than_the_device_takes(author: Any, gl: rg.Session) -> None:
     assert (
         f"RG435 node 'a' (wrong): wrong.py:{author.line('steps.compute')}: it has 10000000 × 1 × 1 work groups" in said
     )
-    assert f"this device takes {most} × " in said
+    assert f"this device supports {most} × " in said
 
 
 ONE_MORE = """

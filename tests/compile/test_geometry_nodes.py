@@ -164,7 +164,7 @@ def test_a_draw_over_a_buffer_that_another_node_filled(author: Any, gl: rg.Sessi
 
 
 LIMITS = {
-    'color = Output(Radiance, samples=16, doc="Colour.")': ("samples", 16, "'a.color' has 16 samples a texel"),
+    'color = Output(Radiance, samples=16, doc="Colour.")': ("samples", 16, "'a.color' has 16 samples per texel"),
     'color = Output(Radiance, kind="texture2d_array", layers=100_000, size=(1, 1), doc="Colour.")': (
         "layers",
         100_000,
@@ -203,7 +203,8 @@ def test_more_targets_than_the_device_takes(author: Any, gl: rg.Session) -> None
     (said,) = author.said(lambda: gl.render(author.pipeline(f"nodes:\n  a: {{type: wrong}}\noutputs: {{{outputs}}}\n")))
     count = gl.device.limits["color_targets"]
     assert (
-        said == f"test.yaml:4:3: RG435 node 'a' (wrong): it has {count + 1} colour targets; this device takes {count}"
+        said
+        == f"test.yaml:4:3: RG435 node 'a' (wrong): it has {count + 1} colour targets; this device supports {count}"
     )
 
 
@@ -221,7 +222,7 @@ def test_more_tables_and_buffers_than_the_device_binds(
     said = author.said(lambda: gl.render(author.pipeline()))
     assert said == [
         "RG435 there are 2 view tables; this device binds 1 at once",
-        f"test.yaml:4:3: RG435 node 'a' (wrong): wrong.py:{author.line('steps.full')}: it has 2 buffers; this device takes 1",
+        f"test.yaml:4:3: RG435 node 'a' (wrong): wrong.py:{author.line('steps.full')}: it has 2 buffers; this device supports 1",
     ]
 
 

@@ -207,7 +207,7 @@ def test_more_samples_than_there_are_is_the_files_mistake(gl: rg.Session, tmp_pa
         pytest.skip("this device has all that can be asked for")
     pipeline = rg.load("forward", sets=["light.samples=16"], size=(16, 16))
     pipeline.check()  # another device may have them
-    with pytest.raises(InputError, match=rf"'light\.radiance' has 16 samples a texel, .* device's {most}") as caught:
+    with pytest.raises(InputError, match=rf"'light\.radiance' has 16 samples per texel, .* device's {most}") as caught:
         gl.render(pipeline)
     assert {problem.code for problem in caught.value.problems} == {"RG435"}
     assert all(problem.place is not None for problem in caught.value.problems)

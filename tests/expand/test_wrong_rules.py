@@ -141,7 +141,7 @@ def test_a_record_that_refuses_the_scene(author: Any) -> None:
 UPDATES = {
     "frame.set_views(self.views, [])": "'a.views' has 1 views, but update set 0",
     "frame.set_views(self.views, [None])": "set_views is given NoneType, not ViewMatrices",
-    "frame.set_views(self.color, [frame.camera])": "set_views is given 'color', which is no Views port",
+    "frame.set_views(self.color, [frame.camera])": "set_views is given 'color', which is not a Views port",
     "frame.set_views('views', [])": "set_views is the text 'views'; give the port itself, self.views",
     "frame.write(self.color, numpy.zeros(4))": "write is the Output 'color', which is not a buffer",
     "frame.write(self.numbers, [None])": "write is given list of object, not an array of numbers",

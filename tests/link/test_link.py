@@ -76,7 +76,7 @@ def test_a_graph_of_typed_nodes(toy_catalog: Catalog) -> None:
 def test_a_function_where_a_texture_is_due_names_textures(toy_catalog: Catalog) -> None:
     text = FORWARD.replace("radiance: light.radiance}}", "radiance: shadows.lookup}}")
     (problem,) = problems(text, toy_catalog)
-    assert problem.startswith("RG201 'display.radiance' takes a texture2d, but 'shadows.lookup'")
+    assert problem.startswith("RG201 'display.radiance' expects a texture2d, but 'shadows.lookup'")
     assert problem.endswith("is a function; 'light.radiance' would fit")
 
 

@@ -482,7 +482,7 @@ CASES = {
             "wrong.comp": "layout(local_size_x = 8) in;\nuniform writeonly image2D color;\n"
             "void main() { imageStore(color, ivec2(0), vec4(1.0)); }"
         },
-        r"wrong\.comp:2:1: RG427 node 'a': image 'color' is an image2D, but 'a\.color' is r32ui, which takes uimage2D",
+        r"wrong\.comp:2:1: RG427 node 'a': image 'color' is an image2D, but 'a\.color' is r32ui, which needs uimage2D",
     ),
 }
 

@@ -255,7 +255,7 @@ class _Block:
         for row in rows[(counts < least) | (counts > most)][:1]:
             count = self.word_counts[row] - 1
             raise self._wrong(
-                int(row), f"'{text_of(self._statement(row))}' takes {least} to {most} numbers, got {count}"
+                int(row), f"'{text_of(self._statement(row))}': expected {least} to {most} numbers, got {count}"
             )
         values = self._parse(self._text(rows), np.float64, int(counts.sum()))
         if values is None:
@@ -292,7 +292,7 @@ class _Block:
             return
         values, counts, at = self._numbers(rows, 3, 7)
         for row in rows[counts == 5][:1]:
-            raise self._wrong(int(row), "'v' takes 3, 4, 6 or 7 numbers, got 5")
+            raise self._wrong(int(row), "'v': expected 3, 4, 6 or 7 numbers, got 5")
         self._add("positions", values[at[:, None] + np.arange(3)])
         colors = np.full((len(rows), 3), np.nan)
         colored = counts >= 6
@@ -307,7 +307,7 @@ class _Block:
             return
         sizes = self.word_counts[faces] - 1
         for row in faces[sizes < 3][:1]:
-            raise self._wrong(int(row), f"a face takes at least 3 corners, got {self.word_counts[row] - 1}")
+            raise self._wrong(int(row), f"'f': expected at least 3 corners, got {self.word_counts[row] - 1}")
         corners = self._corners(faces, sizes)
         seen = np.stack([np.cumsum(kinds == kind)[faces] + self.parsed.counts[kind] for kind in range(3)], axis=1)
         seen = np.repeat(seen, sizes, axis=0)

@@ -71,6 +71,8 @@ def test_the_display_takes_the_mean_by_its_own_curve(draw: Any, noise: Any) -> N
 def test_one_sample_is_refused_by_name() -> None:
     forward = {"exposure": {"type": "exposure", "inputs": {"radiance": "light.radiance"}}}
     pipeline = rg.load("forward", sets=["light.samples=4"], patches=[{"nodes": forward}])
-    said = r"RG214 'exposure.radiance' takes one sample a texel, .* has 4 samples a texel; .*'resolve' between them"
+    said = (
+        r"RG214 'exposure.radiance' expects one sample per texel, .* has 4 samples per texel; .*'resolve' between them"
+    )
     with pytest.raises(InputError, match=said):
         pipeline.check()

@@ -87,13 +87,13 @@ def test_what_is_tested_against_a_pre_pass_has_its_samples(session: rg.Session) 
     pipeline = forward.patch({"nodes": behind})
     differ = (shown(session, pipeline) != shown(session, forward.set("light.samples", 4))).any(axis=-1)
     assert differ.mean() < 0.01
-    with pytest.raises(InputError, match=r"RG425 .* 2 samples a texel, but 'prepass.depth' is 4 samples a texel"):
+    with pytest.raises(InputError, match=r"RG425 .* 2 samples per texel, but 'prepass.depth' is 4 samples per texel"):
         pipeline.set("light.samples", 2).check()
 
 
 def test_one_sample_is_taken_by_what_reads_a_pixel(session: rg.Session) -> None:
     pipeline = rg.load("forward-prepass", sets=["prepass.samples=4"], size=(48, 32))
-    said = r"RG214 'shadows.depth' takes one sample a texel, .* has 4 samples a texel; 'one_sample' between them"
+    said = r"RG214 'shadows.depth' expects one sample per texel, .* has 4 samples per texel; 'one_sample' between them"
     with pytest.raises(InputError, match=said):
         pipeline.check()
     one = {
