@@ -8,7 +8,8 @@ import os
 import sys
 from collections.abc import Sequence
 
-from rendergraph.cli.watchdog import watch
+from rendergraph import activity
+from rendergraph.cli.supervisor import supervise
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -16,11 +17,14 @@ def main(args: Sequence[str] | None = None) -> int:
     if args is None:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy's threads wait for matrices that nothing here has
         gc.set_threshold(100_000)  # what is made at the start stays: to look for cycles in it takes up to 20 ms
-        watch()
+        supervise()
         atexit.register(_leave)
     from rendergraph.cli.app import main as run  # after the process is prepared
 
-    return run(sys.argv[1:] if args is None else args)
+    try:
+        return run(sys.argv[1:] if args is None else args)
+    finally:
+        activity.note("")()  # what ends the process from now on is no crash
 
 
 def _leave() -> None:

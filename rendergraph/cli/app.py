@@ -13,6 +13,7 @@ from copy import copy
 from types import FrameType
 from typing import NoReturn
 
+from rendergraph import activity
 from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import only_data, print_error, say, set_quiet
 from rendergraph.errors import Interruption, Place, Problem, RendergraphError, suggestion
@@ -154,14 +155,14 @@ def main(args: Sequence[str]) -> int:
             _flush()
             return code
     except RendergraphError as error:
-        return _fail(error.problems, error.exit_code, as_json)
+        return fail(error.problems, error.exit_code, as_json)
     except click.exceptions.NoArgsIsHelpError as error:
         say(error.format_message())
         return error.exit_code
     except click.UsageError as error:
-        return _fail([_usage(error)], error.exit_code, as_json)
+        return fail([_usage(error)], error.exit_code, as_json)
     except click.ClickException as error:
-        return _fail([Problem("RG500", error.format_message())], error.exit_code, as_json)
+        return fail([Problem("RG500", error.format_message())], error.exit_code, as_json)
     except (KeyboardInterrupt, click.Abort):
         say("interrupted")
         return INTERRUPTED
@@ -173,16 +174,16 @@ def main(args: Sequence[str]) -> int:
         _discard_stdout()  # the reader closed the pipe: `rendergraph nodes | head`
         return 0
     except MemoryError:
-        return _fail([Problem("RG509", "out of memory")], 1, as_json)
+        return fail([Problem("RG509", f"out of memory{activity.during()}")], 1, as_json)
     except OSError as error:
         if os.environ.get("RENDERGRAPH_TRACEBACK"):
             raise
         where = Place(str(error.filename)) if error.filename else None
-        return _fail([Problem("RG509", error.strerror or str(error), where)], 1, as_json)
+        return fail([Problem("RG509", error.strerror or str(error), where)], 1, as_json)
     except BaseException as error:  # SystemExit in third-party code, too
         if os.environ.get("RENDERGRAPH_TRACEBACK"):
             raise
-        return _fail([unexpected(error)], 1, as_json)
+        return fail([unexpected(error)], 1, as_json)
 
 
 def _invoke(words: list[str]) -> int:
@@ -202,7 +203,7 @@ def _invoke(words: list[str]) -> int:
     return 0
 
 
-def _fail(problems: Sequence[Problem], code: int, as_json: bool) -> int:
+def fail(problems: Sequence[Problem], code: int, as_json: bool) -> int:
     """Print what went wrong and return the exit code, even where nothing can be printed."""
     try:
         print_error(problems, code, as_json=as_json)
@@ -243,21 +244,31 @@ def _discard_stdout() -> None:
 
 @contextlib.contextmanager
 def _terminable() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP unwind like Ctrl-C: half-written files are removed, child processes ended.
+    """Let the first of SIGINT, SIGTERM and SIGHUP unwind: half-written files are removed, child processes ended.
 
-    A SIGHUP that is ignored, as under nohup, stays ignored.
+    What is ignored, as SIGHUP under nohup, stays ignored.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
-    def stop(number: int, frame: FrameType | None) -> NoReturn:
-        raise Interruption(number)
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    handled = [number for number in signals if signal.getsignal(number) is not signal.SIG_IGN]
+    interruptions: list[BaseException] = []
 
-    handled = [number for number in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(number) is not signal.SIG_IGN]
+    def stop(number: int, frame: FrameType | None) -> NoReturn:
+        for each in handled:  # unwinding is not to be interrupted; the supervisor ends what takes too long
+            signal.signal(each, signal.SIG_IGN)
+        interruptions.append(KeyboardInterrupt() if number == signal.SIGINT else Interruption(number))
+        raise interruptions[0]
+
     before = {number: signal.signal(number, stop) for number in handled}
     try:
         yield
+    except BaseException as error:
+        if interruptions and error is not interruptions[0]:
+            raise interruptions[0] from error  # on the way up it has become something else
+        raise
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

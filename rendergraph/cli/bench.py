@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 @click.option("--steps", is_flag=True, help="Time each step of a pass, too.")
 @options.json_option
 @options.device_option
+@options.draw_timeout_option
 def command(
     selection: Selection,
     frames: int,

@@ -110,6 +110,7 @@ threshold_option = click.option(
 @options.executor_options
 @options.json_option
 @options.device_option
+@options.draw_timeout_option
 def command(
     pipelines: tuple[str, ...],
     withs: tuple[tuple[str, ...], ...],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
+import os
 import re
 from collections.abc import Callable
 from functools import wraps
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from msgspec import Struct
 
+from rendergraph.activity import DRAW_TIMEOUT
 from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import emit, emit_json, warn
 from rendergraph.errors import InputError
@@ -193,6 +195,22 @@ heap_option = click.option(
 )
 plugin_option = click.option(
     "--plugin", "plugins", multiple=True, type=_PATH, metavar="PATH", help="Node module or folder of them; runs code."
+)
+
+
+def _limit_draws(ctx: click.Context, param: click.Parameter, value: float | None) -> None:
+    os.environ.pop(DRAW_TIMEOUT, None)
+    if value is not None:
+        os.environ[DRAW_TIMEOUT] = str(value)
+
+
+draw_timeout_option = click.option(
+    "--draw-timeout",
+    type=POSITIVE,
+    metavar="SECONDS",
+    expose_value=False,
+    callback=_limit_draws,
+    help="Exit with code 1 if drawing a frame takes longer, and name the step.",
 )
 device_option = click.option("--device", metavar="NUMBER", type=int, help="GL device, as `doctor` numbers them.")
 scene_option = click.option(

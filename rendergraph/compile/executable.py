@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct, field
 
+from rendergraph import activity
 from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES
 from rendergraph.compile.memory import Call
 from rendergraph.compile.reuse import Reuse, Source
@@ -82,6 +83,7 @@ class CompiledStep(Struct, eq=False):
         sorted: draws whose order is the eye's, instead of `draws`.
         after: barriers, poison.
         watched: around the draws: calls that count, or leave them out; first and last.
+        name: the step's, as plans have it.
     """
 
     step: Step
@@ -90,6 +92,7 @@ class CompiledStep(Struct, eq=False):
     sorted: SortedDraws | None = None
     after: list[Call] = field(default_factory=list)
     watched: tuple[list[Call], list[Call]] = field(default_factory=lambda: ([], []))
+    name: str = ""
 
     @property
     def all_draws(self) -> list[Draw]:
@@ -186,9 +189,9 @@ class Executable(Struct, eq=False, dict=True):
 
     def done(self) -> None:
         """A frame has run: go on without the kept steps that were due."""
-        self._begun = False
+        self._begun, self.lists = False, self._steady
         if self.due:
-            self.due, self.lists, self.made_kept = set(), self._steady, True
+            self.due, self.made_kept = set(), True
 
     def have(self, resources: Collection[str]) -> None:
         """These kept values have been put where they belong: the steps that make nothing else have not to run."""
@@ -308,7 +311,7 @@ class Executable(Struct, eq=False, dict=True):
                     (own if key in shared else self.statics).append(write)
             return own
 
-        def listed(parity: int, positions: Iterable[int]) -> list[FrameStep]:
+        def listed(parity: int, positions: Iterable[int], *, wait: bool = False) -> list[FrameStep]:
             state: Pieces | None = None
             found: list[FrameStep] = []
             for position in positions:
@@ -329,16 +332,24 @@ class Executable(Struct, eq=False, dict=True):
                     ]
                     calls.append(compiled.sorted)
                     state = None
-                found.append(FrameStep(compiled.step, (*calls, *compiled.watched[1], *compiled.after), timer))
+                doing = f"drawing step '{compiled.name}'"
+                begin = activity.note(doing if wait else f"{doing} or a step before it")
+                calls = [begin, *calls, *compiled.watched[1], *compiled.after]
+                found.append(FrameStep(compiled.step, tuple(calls), timer))
+            if wait:
+                finish = self.device.ctx.finish
+                found = [FrameStep(step.step, (*step.calls, finish), step.timer) for step in found]
             return found
 
-        def all_but_kept(due: Container[StepKey]) -> list[list[FrameStep]]:
+        def all_but_kept(due: Container[StepKey], *, wait: bool = False) -> list[list[FrameStep]]:
             keys = [compiled.step.key for compiled in self.steps[0]]
             positions = [at for at, key in enumerate(keys) if key not in self.kept or key in due]
-            return [listed(parity, positions) for parity in range(len(self.steps))]
+            return [listed(parity, positions, wait=wait) for parity in range(len(self.steps))]
 
-        self.lists = all_but_kept(self.due)
-        self._steady = all_but_kept(()) if self.due else self.lists
+        # Drivers draw later than they are told to. To name a step that hangs, a first frame waits for each one.
+        wait = activity.draw_seconds() > 0
+        self._steady = all_but_kept(())
+        self.lists = all_but_kept(self.due, wait=wait) if self.due or wait else self._steady
         self._listed, self._parts = listed, {}
         self.fresh = True
 

@@ -10,6 +10,7 @@ import moderngl
 from msgspec import Struct
 from msgspec.structs import replace
 
+from rendergraph import activity
 from rendergraph.allocate import ResourcePlan
 from rendergraph.catalog import NodeType
 from rendergraph.compile.checks import attribute_formats, check_attributes, check_program, layout_for
@@ -30,6 +31,7 @@ from rendergraph.gl.queries import OcclusionQuery, Timer
 from rendergraph.gl.textures import Clear, poison_value
 from rendergraph.program import StepTexts, Texts, check_kept_text, positions_macro
 from rendergraph.program.variants import view_count
+from rendergraph.schedule import step_names
 from rendergraph.steps import Read, Step, Write
 from rendergraph.textures import FORMATS, TextureDesc
 
@@ -95,6 +97,7 @@ class _Compiler(Struct, eq=False, dict=True):
         self._geometry_draws: dict[tuple[str, int, int], list[Draw] | SortedDraws] = {}
         # In a context of somebody else's such a query may be under way: there all is drawn.
         asked = {(step.node, step.if_drawn) for step in self.plan.schedule.steps} if self.device.owned else set()
+        self._names = step_names(self.plan.schedule.steps)
         self._queries = {
             step.key: OcclusionQuery(self.device) for step in self.plan.schedule.steps if step.key in asked
         }
@@ -119,10 +122,12 @@ class _Compiler(Struct, eq=False, dict=True):
         made.timers = [Timer(self.device) for _ in self.plan.schedule.steps]
         made.occlusion_queries = list(self._queries.values())
         made.renew()
+        activity.note("preparing a frame")()
         return made
 
     def _step(self, step: Step, position: int, parity: int) -> CompiledStep:
-        compiled = CompiledStep(step)
+        compiled = CompiledStep(step, name=self._names[step.key])
+        activity.note(f"compiling step '{compiled.name}'")()
         drawing = {
             "fullscreen": self._fullscreen,
             "geometry": self._geometry,

@@ -9,6 +9,7 @@ from rendergraph.images.decode import decode_light as decode_light
 from rendergraph.images.decode import read as read
 from rendergraph.images.decode import read_metadata as read_metadata
 from rendergraph.images.encode import EXTENSIONS as EXTENSIONS
+from rendergraph.images.encode import picture_bytes as picture_bytes
 from rendergraph.images.encode import write as write
 from rendergraph.images.saving import PictureInfo as PictureInfo
 from rendergraph.images.saving import Saved as Saved

@@ -69,25 +69,37 @@ Job: TypeAlias = "tuple[Path, Pixels, Sequence[str] | None, Encoding, bool]"
 def write_all(jobs: Sequence[Job], metadata: Mapping[str, str]) -> None:
     """Write pictures that appear together; each job is the arguments of `write`."""
     with staged([job[0] for job in jobs]) as parts:
-        for part, (path, pixels, channels, encoding, half) in zip(parts, jobs, strict=True):
-            shaped = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
-            if EXTENSIONS[path.suffix.lower()] in ("png", "jpeg"):
-                shaped, names, kind = _eight_bits(path, shaped, encoding), None, "uint8"
-            else:
-                names = tuple(channels or _NAMES[shaped.shape[-1]])
-                shaped = _values(path, shaped)
-                if encoding == "display":
-                    shaped = np.concatenate([from_srgb(shaped[..., :3]), shaped[..., 3:]], axis=-1)
-                kind = "half" if half else "float"
-                if path.suffix.lower() == ".hdr":
-                    shaped, names, kind = _radiance(path, shaped), None, "float"
-                elif shaped.ndim == 4:
-                    names = tuple(f"{layer:03d}.{name}" for layer in range(len(shaped)) for name in names)
-                    shaped = np.moveaxis(shaped, 0, 2).reshape(*shaped.shape[1:3], -1)
-            try:
-                _write_file(path, part, shaped, names, kind, metadata)
-            except OSError as error:
-                raise failed(path, error.strerror or str(error)) from error
+        for part, job in zip(parts, jobs, strict=True):
+            _write_job(job, part, metadata)
+
+
+def picture_bytes(job: Job, metadata: Mapping[str, str]) -> bytes:
+    """Return the bytes of the file that `write_all` would write; nothing is left behind where the process is killed."""
+    with open(os.memfd_create("picture"), "rb") as file:
+        _write_job(job, Path(f"/proc/self/fd/{file.fileno()}"), metadata)
+        return file.read()
+
+
+def _write_job(job: Job, part: Path, metadata: Mapping[str, str]) -> None:
+    path, pixels, channels, encoding, half = job
+    shaped = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
+    if EXTENSIONS[path.suffix.lower()] in ("png", "jpeg"):
+        shaped, names, kind = _eight_bits(path, shaped, encoding), None, "uint8"
+    else:
+        names = tuple(channels or _NAMES[shaped.shape[-1]])
+        shaped = _values(path, shaped)
+        if encoding == "display":
+            shaped = np.concatenate([from_srgb(shaped[..., :3]), shaped[..., 3:]], axis=-1)
+        kind = "half" if half else "float"
+        if path.suffix.lower() == ".hdr":
+            shaped, names, kind = _radiance(path, shaped), None, "float"
+        elif shaped.ndim == 4:
+            names = tuple(f"{layer:03d}.{name}" for layer in range(len(shaped)) for name in names)
+            shaped = np.moveaxis(shaped, 0, 2).reshape(*shaped.shape[1:3], -1)
+    try:
+        _write_file(path, part, shaped, names, kind, metadata)
+    except OSError as error:
+        raise failed(path, error.strerror or str(error)) from error
 
 
 def _eight_bits(path: Path, pixels: Pixels, encoding: Encoding) -> Pixels:

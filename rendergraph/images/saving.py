@@ -13,7 +13,7 @@ import numpy.typing as npt
 from msgspec import Struct
 
 from rendergraph.errors import InputError, Place, Problem, UsageError, suggestion
-from rendergraph.images.encode import EXTENSIONS, Job, write_all
+from rendergraph.images.encode import EXTENSIONS, Job, picture_bytes, write_all
 from rendergraph.images.viewable import Bytes, viewable
 from rendergraph.textures import FORMATS
 
@@ -82,27 +82,22 @@ def save_outputs(files: Sequence[Saved], metadata: Mapping[str, str]) -> None:
     PNG and JPEG are made viewable. EXR and HDR hold linear light, so display colours are decoded; a tap's values are
     kept as they are.
     """
-    jobs: list[Job] = []
-    for path, pixels, info, raw in files:
-        if EXTENSIONS[extension(path)] in ("png", "jpeg"):
-            jobs.append((path, viewable_as(pixels, info), None, "data", False))
-            continue
-        pixels = _numbers(pixels, info)
-        shaped = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
-        decoded = not raw and info.encoding == "display"
-        half = decoded or info.format in _HALF_FORMATS or pixels.dtype == np.float16
-        names = channel_names(info, shaped.shape[-1])
-        jobs.append((path, shaped, names, "display" if decoded else "data", half))
-    write_all(jobs, metadata)
+    write_all(list(map(_job, files)), metadata)
 
 
 def encoded(file: Saved, metadata: Mapping[str, str]) -> bytes:
-    import tempfile  # brings random numbers along, which nothing else needs
+    return picture_bytes(_job(file), metadata)
 
-    with tempfile.TemporaryDirectory(prefix="rendergraph-") as folder:
-        path = Path(folder) / file.path.name
-        save_outputs([file._replace(path=path)], metadata)
-        return path.read_bytes()
+
+def _job(file: Saved) -> Job:
+    path, pixels, info, raw = file
+    if EXTENSIONS[extension(path)] in ("png", "jpeg"):
+        return path, viewable_as(pixels, info), None, "data", False
+    pixels = _numbers(pixels, info)
+    shaped = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
+    decoded = not raw and info.encoding == "display"
+    half = decoded or info.format in _HALF_FORMATS or pixels.dtype == np.float16
+    return path, shaped, channel_names(info, shaped.shape[-1]), "display" if decoded else "data", half
 
 
 def viewable_as(pixels: Pixels, info: TexelInfo) -> Bytes:

@@ -8,6 +8,7 @@ from time import perf_counter
 
 from msgspec import Struct, field
 
+from rendergraph import activity
 from rendergraph.compile import Executable, GpuScene
 from rendergraph.errors import Place, Problem, RenderError
 from rendergraph.execute import FrameTimes, Runner
@@ -22,6 +23,8 @@ from rendergraph.session.picture_metadata import frame_metadata, pipeline_metada
 from rendergraph.session.values import Expanded, OutputRequest
 from rendergraph.textures import FORMATS, Semantic, TextureDesc
 from rendergraph.version import __version__
+
+_NOTE_DONE = activity.note("reading a frame back")
 
 
 class Drawing(Struct, eq=False, dict=True):
@@ -97,11 +100,13 @@ class Drawing(Struct, eq=False, dict=True):
         self.camera = camera or scene.cameras[linked.selection.camera or next(iter(scene.cameras))]
         view = view_matrices(self.camera, linked.graph.size)
         begun = perf_counter()
-        times = self.runner.run(number, time, 1.0 / fps, scene, view, timed=self.expanded.options.timed)
-        if times is not None:
-            return times
-        self.gpu.device.ctx.finish()
-        return FrameTimes((perf_counter() - begun) * 1e3, (), self.runner.ran)
+        with activity.limited_draw():
+            times = self.runner.run(number, time, 1.0 / fps, scene, view, timed=self.expanded.options.timed)
+            if times is None:
+                self.gpu.device.ctx.finish()
+                times = FrameTimes((perf_counter() - begun) * 1e3, (), self.runner.ran)
+        _NOTE_DONE()
+        return times
 
     def read(self) -> Frame:
         """Read back the requested outputs of the last frame."""

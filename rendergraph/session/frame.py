@@ -188,7 +188,8 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
         return path
 
     def _repr_png_(self) -> bytes:
-        import tempfile
+        from rendergraph.images import Saved, encoded, output_for
 
-        with tempfile.TemporaryDirectory() as folder:
-            return self.save(Path(folder) / "frame.png").read_bytes()
+        path = Path("frame.png")
+        name = output_for(path, self.arrays)
+        return encoded(Saved(path, self.arrays[name], self.infos[name]), self.metadata)

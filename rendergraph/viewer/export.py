@@ -6,7 +6,6 @@ import base64
 import json
 import re
 from collections.abc import Mapping
-from contextlib import closing
 from html import escape
 from typing import Any
 
@@ -25,20 +24,20 @@ _LIST = re.compile(r"^export \{ ([\w, ]+) \};$", re.MULTILINE)
 
 def export_page(state: ViewState, gpu: Gpu) -> str:
     """Return the page with everything in it, as HTML."""
-    with closing(RenderService(gpu)) as service:
-        picture = _ask(service, state.request())
-        state.record(picture)
-        facts = dict(picture.facts)
-        messages = [
-            _message("state", state.as_json()),
-            _message("pipeline", facts.pop("pipeline")),
-            _message("picture", facts | {"frame": state.frame}, picture.files),
-        ]
-        if state.other is not None:
-            against = _ask(service, CompareRequest(state.other))
-            messages.append(_message("against", against.facts, against.files))
-        thumbnails = _ask(service, ThumbnailRequest())
-        messages.append(_message("thumbnails", thumbnails.facts, thumbnails.files))
+    service = RenderService(gpu)
+    picture = _ask(service, state.request())
+    state.record(picture)
+    facts = dict(picture.facts)
+    messages = [
+        _message("state", state.as_json()),
+        _message("pipeline", facts.pop("pipeline")),
+        _message("picture", facts | {"frame": state.frame}, picture.files),
+    ]
+    if state.other is not None:
+        against = _ask(service, CompareRequest(state.other))
+        messages.append(_message("against", against.facts, against.files))
+    thumbnails = _ask(service, ThumbnailRequest())
+    messages.append(_message("thumbnails", thumbnails.facts, thumbnails.files))
     return _html(messages, str(picture.facts["pipeline"]["name"]))
 
 

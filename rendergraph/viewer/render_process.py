@@ -59,6 +59,8 @@ class RenderProcess:
             return response
 
     def close(self) -> None:
+        if (child := self._child) is not None:
+            child.process.kill()  # a thread that waits for its answer has the lock, and now hears of the end
         with self._lock:
             self._end()
 
@@ -88,6 +90,7 @@ def main(pipe: int, device: int | None) -> None:
             end.recv()
             end.send(error)
             return
-        with gpu, contextlib.closing(RenderService(gpu)) as service:
+        with gpu:
+            service = RenderService(gpu)
             while True:
                 end.send(service.answer(end.recv()))

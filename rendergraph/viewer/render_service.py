@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import singledispatchmethod
@@ -87,10 +86,6 @@ class RenderService:
         self._timed: Executable | None = None
         self._pass_times: dict[str, dict[str, Any]] = {}
         self._rendered: _Rendered | None = None
-        self._folder = tempfile.TemporaryDirectory(prefix="rendergraph-view-")
-
-    def close(self) -> None:
-        self._folder.cleanup()
 
     def answer(self, request: Request) -> Response:
         """Return the response; mistakes of the user are in it, not raised."""
@@ -276,9 +271,7 @@ class RenderService:
     # --- encoding, and errors ----------------------------------------------------------------------------------------
 
     def _encode(self, picture: npt.NDArray[np.uint8], ending: str) -> bytes:
-        path = Path(self._folder.name) / f"picture{ending}"
-        images.write(path, picture)
-        return path.read_bytes()
+        return images.picture_bytes((Path(f"picture{ending}"), picture, None, "data", False), {})
 
     def _as_json(self, problem: Problem) -> dict[str, Any]:
         return problem.as_json() | {"node": self._node_at(problem.place) if problem.place else None}

@@ -325,43 +325,6 @@ def test_no_command_line_ends_in_a_traceback(cli: Any, seed: int) -> None:
         json.loads(result.out)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "deaf"), [("SIGTERM", True), ("SIGINT", True), ("SIGTERM", False)])
-def test_what_cannot_hear_a_signal_is_ended_after_a_while(tmp_path: Path, name: str, deaf: bool) -> None:
-    code = (
-        "import sys, time; from rendergraph.cli import main, watchdog; from rendergraph.session import stages\n"
-        "def resolve(*a, **k):\n print('ready', flush=True)\n"
-        f" {'max(range(10**13))' if deaf else 'time.sleep(30)'}\n"
-        f"watchdog.PATIENCE = {0.5 if deaf else 15}; stages.resolve = resolve; sys.argv[1:] = ['check', 'x']\nsys.exit(main())"
-    )
-    process = subprocess.Popen(
-        [sys.executable, "-c", code],
-        stderr=subprocess.PIPE,
-        cwd=tmp_path,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a background job's suite ignores SIGINT
-    )
-    assert process.stderr is not None
-    assert process.stderr.readline() == "ready\n"
-    time.sleep(0.5)  # until it is deaf
-    start = time.monotonic()
-    process.send_signal(getattr(signal, name))
-    _, err = process.communicate(timeout=20)
-    taken = time.monotonic() - start
-    assert (process.returncode, err) == ((-signal.SIGKILL, "") if deaf else (143, "terminated\n"))
-    assert taken > 0.4 if deaf else taken < 15
-
-
-@pytest.mark.slow
-def test_the_watcher_ends_with_the_process_and_holds_none_of_its_streams(tmp_path: Path) -> None:
-    start = time.monotonic()
-    done = subprocess.run(
-        [sys.executable, "-m", "rendergraph", "--version"], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.startswith("rendergraph, version ")
-    assert time.monotonic() - start < 20
-
-
 @pytest.mark.parametrize("frames", ["1-999999999", "5-100005"])
 def test_more_frames_than_anybody_waits_for_are_refused(cli: Any, frames: str) -> None:
     found = cli("run", "forward", "--frames", frames, "-o", "a.####.png", "--size", "8x8")

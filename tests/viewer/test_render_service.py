@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -30,9 +28,8 @@ FORWARD = rg.Selection("forward", size=SIZE)
 
 
 @pytest.fixture
-def service(gl: rg.Session) -> Iterator[RenderService]:
-    with closing(RenderService(gl)) as found:
-        yield found
+def service(gl: rg.Session) -> RenderService:
+    return RenderService(gl)
 
 
 def picture(answer: Response, folder: Path, name: str = "picture") -> np.ndarray:
@@ -195,12 +192,12 @@ def test_a_changed_file_is_noticed_and_drawn(service: RenderService, tmp_path: P
 
 
 def test_a_moving_picture_is_rendered_smaller_where_that_takes_long(gl: rg.Session) -> None:
-    with closing(RenderService(gl, interactive_ms=1e9)) as service:
-        service.answer(RenderRequest(FORWARD))
-        assert service.answer(RenderRequest(FORWARD, still=False)).facts["size"] == list(SIZE)
-    with closing(RenderService(gl, interactive_ms=0.0)) as slow:
-        slow.answer(RenderRequest(FORWARD))
-        assert slow.answer(RenderRequest(FORWARD, still=False)).facts["size"] == [16, 9]
+    service = RenderService(gl, interactive_ms=1e9)
+    service.answer(RenderRequest(FORWARD))
+    assert service.answer(RenderRequest(FORWARD, still=False)).facts["size"] == list(SIZE)
+    slow = RenderService(gl, interactive_ms=0.0)
+    slow.answer(RenderRequest(FORWARD))
+    assert slow.answer(RenderRequest(FORWARD, still=False)).facts["size"] == [16, 9]
 
 
 def test_exposure_is_of_light_alone(service: RenderService, tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import math
 import re
-import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -15,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rendergraph.compare.timing import Spread
-from rendergraph.images import viewable, write
+from rendergraph.images import picture_bytes, viewable
 from rendergraph.metrics import Encoding, Pixels
 
 SOFTWARE = "software rasteriser: no measure of a GPU"
@@ -27,10 +26,8 @@ def software_note(software: bool) -> str:
 
 def png(pixels: npt.NDArray[np.uint8]) -> str:
     """Return a picture as a data URL."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "picture.png"
-        write(path, pixels)
-        return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
+    data = picture_bytes((Path("picture.png"), pixels, None, "data", False), {})
+    return "data:image/png;base64," + base64.b64encode(data).decode()
 
 
 def eight_bit(pixels: Pixels, encoding: Encoding) -> npt.NDArray[np.uint8]:

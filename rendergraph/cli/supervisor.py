@@ -1,0 +1,86 @@
+"""The process that the shell waits for: it forks the worker, which does everything, and exits as that ends.
+
+While a driver renders or compiles, Python handles no signal; when a driver crashes, nothing in its process is left to
+say so. The supervisor is never in a driver. It passes signals on, kills a worker that does not end, and reports a crash
+with the worker's activity. It costs a fork before anything is imported, half a millisecond.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Set as AbstractSet
+
+from rendergraph import activity
+
+PATIENCE = 1.2
+"""Seconds from a signal to the end: finished files are on the disk by then, and files appear whole or not at all."""
+_PR_SET_PDEATHSIG = 1
+
+
+def supervise() -> None:
+    """Return in the worker, a new process, with signals that end it silently; called once, before there are threads."""
+    ending = {n for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if signal.getsignal(n) is not signal.SIG_IGN}
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_BLOCK, {*ending, signal.SIGCHLD})
+    supervisor = os.getpid()
+    worker = os.fork()
+    if worker:
+        os._exit(_wait(worker, ending))
+    for number in ending:
+        signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {*ending, signal.SIGCHLD})
+    if sys.platform == "linux":
+        import ctypes  # takes 2 ms, in which Ctrl-C is already heard
+
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != supervisor:
+        os._exit(1)
+    activity.note("preparing")()
+
+
+def _wait(worker: int, ending: AbstractSet[int]) -> int:
+    """Wait for the worker's end, and return the exit code."""
+    signalled, deadline = 0, time.monotonic() + 1e9
+    while True:
+        found = signal.sigtimedwait({*ending, signal.SIGCHLD}, max(0.0, deadline - time.monotonic()))
+        if found is None:
+            os.kill(worker, signal.SIGKILL)
+            deadline += 1e9
+        elif found.si_signo == signal.SIGCHLD:
+            ended, status = os.waitpid(worker, os.WNOHANG)
+            if ended:
+                return _exit_code(os.waitstatus_to_exitcode(status), signalled, ending)
+        else:
+            if not signalled:
+                signalled, deadline = found.si_signo, time.monotonic() + PATIENCE
+            if found.si_code <= 0:  # from `kill`; a terminal sends it to the worker, too
+                os.kill(worker, found.si_signo)
+
+
+def _exit_code(code: int, signalled: int, ending: AbstractSet[int]) -> int:
+    """Return the exit code for the worker's; say why where it has not ended by itself."""
+    during = activity.during()
+    if code >= 0 and not (code and during):
+        return code
+    from rendergraph.cli.app import INTERRUPTED, fail  # rarely needed
+    from rendergraph.errors import Problem
+
+    if signalled or -code in ending:
+        number = signalled or -code
+        os.write(2, b"interrupted\n" if 128 + number == INTERRUPTED else b"terminated\n")
+        return 128 + number
+    if code == -signal.SIGALRM:
+        text = f"--draw-timeout passed{during}; allow more, or draw less at a time"
+    elif code == -signal.SIGKILL:
+        text = f"the process was killed (SIGKILL){during}; the system does so when memory runs out"
+    else:
+        how = f"crashed ({signal.Signals(-code).name})" if code < 0 else f"was ended by a library (exit code {code})"
+        text = f"the process {how}{during}; too little memory can cause this, or a fault of the driver: "
+        text += "try a smaller --size, or another driver"
+    return fail([Problem("RG622", text)], 1, as_json="--json" in sys.argv)
+
+
+__all__ = ["PATIENCE", "supervise"]
