@@ -4,7 +4,10 @@
 WORKERS ?= 2
 
 # Mesa compiles each shader once and keeps it here, for all workers and for later runs: compiling takes most of the tests' time.
+# Without LLVM's optimisations it compiles twice as fast, and the pictures of tests are small; `make nightly` runs with them.
 export MESA_SHADER_CACHE_DIR ?= $(CURDIR)/.cache/mesa
+test quick: export GALLIVM_PERF ?= nopt
+unexport PYTHONDONTWRITEBYTECODE  # where it is set, every process that a test starts compiles every module again
 $(shell mkdir -p $(MESA_SHADER_CACHE_DIR))
 
 .PHONY: check nightly format lint types imports docs pages pictures test quick clean
@@ -21,9 +24,10 @@ lint:
 	ruff format --check .
 	ruff check .
 
+# mypy reads everything; pyright, which editors use, what authors of nodes and scripts import, and in `make nightly` the rest.
 types:
 	mypy
-	pyright
+	pyright nodes rendergraph/__init__.py rendergraph/api rendergraph/session
 
 imports:
 	lint-imports
@@ -48,6 +52,7 @@ quick:
 
 # What is slow by nature: every pipeline in every mode, long fuzzing, large references, a second driver.
 nightly:
+	pyright
 	sphinx-build -q -W --keep-going -D pictures=0 -b html docs docs/_build/html-nightly
 	pytest -n $(WORKERS) --nightly
 

@@ -17,7 +17,7 @@ from msgspec.structs import asdict
 
 from rendergraph.authoring.node_check import SCENE, NodeCheck
 from rendergraph.authoring.report import Report
-from rendergraph.authoring.variants import variants
+from rendergraph.authoring.variants import NodeVariant, variants
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.catalog.types import shared_includes
 from rendergraph.declare import Function, Input, Node, Views, WrittenPort
@@ -60,7 +60,12 @@ def _plugin_of(file: Path) -> Path:
     return file
 
 
-def examine(node: NodeType, scene: str = SCENE, on_stage: OnStage = lambda stage, what: None) -> Report:
+def examine(
+    node: NodeType,
+    scene: str = SCENE,
+    on_stage: OnStage = lambda stage, what: None,
+    renders: Callable[[NodeVariant], bool] = lambda variant: True,
+) -> Report:
     severity: Literal["error", "warning"] = "warning" if node.is_shader else "error"
     problems = [*node.warnings, *_declared(node)]
     with tempfile.TemporaryDirectory() as folder:
@@ -69,7 +74,7 @@ def examine(node: NodeType, scene: str = SCENE, on_stage: OnStage = lambda stage
         check.check_scene()
         for variant in variants(node.cls):
             on_stage("pass", variant.name or "default")
-            check.run(variant)
+            check.run(variant, renders(variant))
         discards = any(problem.code == "RG446" for problem in node.warnings)  # that says the same as RG454
         problems += [problem for problem in check.close() if not (discards and problem.code == "RG454")]
     if check.tried and not any(problem.severity == "error" for problem in problems):  # else nothing may have run

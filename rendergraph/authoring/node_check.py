@@ -68,12 +68,12 @@ class NodeCheck:
         self._fed: dict[str, npt.NDArray[Any]] = {}
         self._fills_buffers = node.cls.update is not Node.update  # which may happen only once
 
-    def run(self, variant: NodeVariant) -> None:
-        """Link, compile and render a variant twice, and keep its problems."""
+    def run(self, variant: NodeVariant, renders: bool = True) -> None:
+        """Link and compile a variant, render it twice if `renders`, and keep its problems."""
         self._variant = variant = variant.without(self.type.cls, self._avoided)
         self.tried.append(variant.name or "default")
         try:
-            self._run(variant)
+            self._run(variant, renders)
         except RendergraphError as error:
             if any(isinstance(cause, MemoryError) for cause in cause_chain(error)):
                 raise  # ends the check
@@ -82,7 +82,7 @@ class NodeCheck:
             if len(rest) < len(variant.outputs) and not variant.is_range_end:  # outputs may depend on links and choices
                 self.tried.pop()
                 if rest:
-                    self.run(replace(variant, outputs=rest))
+                    self.run(replace(variant, outputs=rest), renders)
             elif variant.name and _exceeds_device(error):
                 self.tried.pop()
             else:
@@ -164,7 +164,7 @@ class NodeCheck:
 
     # --- rendering ---------------------------------------------------------------------------------------------------
 
-    def _run(self, variant: NodeVariant) -> None:
+    def _run(self, variant: NodeVariant, renders: bool = True) -> None:
         with self.gpu.current():
             if not self._fed and self.harness.fed:
                 self._fed = self._draw(stages.compile(self._expanded(NodeVariant("")), self.gpu), 0)
@@ -178,8 +178,9 @@ class NodeCheck:
                 for draw in compiled.all_draws:
                     self._interface(compiled.step, draw)
                 self._note_files(compiled.step)
-            drawn = [self._draw(drawing, number) for number in (0, 1)]
-        self._compare(*drawn)
+            drawn = [self._draw(drawing, number) for number in (0, 1) if renders]
+        if renders:
+            self._compare(*drawn)
 
     def _resolved(self, variant: NodeVariant) -> Resolved:
         file = self.harness.write(variant, self.scene)

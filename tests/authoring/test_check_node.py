@@ -652,24 +652,45 @@ def test_what_is_right_is_not_complained_of(name: str, tmp_path: Path) -> None:
     assert report.problems == ()
 
 
-def test_an_optional_input_of_a_base_that_does_not_go_with_the_node_is_left_out_and_said(tmp_path: Path) -> None:
-    of = 'samples=lambda node, facts: 4, doc="Four samples.")'
-    text = f'''
-import rendergraph.nodes.lighting.forward_lighting as lighting
+BASE = '''
+class Surfaces(Node):
+    """The scene in white, behind nothing that a pre-pass has drawn."""
 
+    depth = Input(Depth, use="depth_test", optional=True, doc="Depth of a pre-pass.")
+    radiance = Output(Radiance, clear=0.0, doc="White.")
+    surface_depth = Output(Depth, format="depth32f", clear=0.0, doc="Depth.")
 
-class Glow(lighting.ForwardLighting):
-    """Forward lighting with samples."""
-
-    radiance = Output(Radiance, clear=0.0, {of}
-    diffuse = Output(Radiance, clear=0.0, {of}
-    surface_depth = Output(Depth, format="depth32f", clear=0.0, {of}
+    def record(self, steps: Steps) -> None:
+        if steps.connected(self.depth):
+            steps.geometry("white.frag", out={"white": self.radiance}, depth=self.depth, view=self.depth, materials="none")
+        else:
+            out = {"white": self.radiance, "depth": self.surface_depth}
+            steps.geometry("white.frag", out=out, materials="none")
 '''
-    (problem,) = examine(written(tmp_path, text)).problems
+DERIVED = '''
+from ._surfaces import Surfaces
+
+
+class Glow(Surfaces):
+    """The scene in white, with samples."""
+
+    radiance = Output(Radiance, clear=0.0, samples=lambda node, facts: 4, doc="Four samples.")
+    surface_depth = Output(Depth, format="depth32f", clear=0.0, samples=lambda node, facts: 4, doc="Four samples.")
+'''
+
+
+def test_an_optional_input_of_a_base_that_does_not_go_with_the_node_is_left_out_and_said(tmp_path: Path) -> None:
+    nodes, shaders = tmp_path / "nodes" / "light", tmp_path / "shaders" / "light"
+    nodes.mkdir(parents=True)
+    shaders.mkdir(parents=True)
+    written(shaders, "")
+    (nodes / "_surfaces.py").write_text(IMPORTS + BASE)
+    (nodes / "glow.py").write_text(IMPORTS + DERIVED)
+    (problem,) = examine(nodes / "glow.py").problems
     assert (problem.code, problem.severity) == ("RG425", "warning")
     assert problem.message.endswith("; tried without 'depth', which is inherited")
-    one_of_them = text.replace("Radiance, clear=0.0, samples=lambda node, facts: 4", "Radiance, clear=0.0")
-    broken = examine(written(tmp_path, one_of_them))
+    (nodes / "glow.py").write_text(IMPORTS + DERIVED.replace("0.0, samples=lambda node, facts: 4", "0.0", 1))
+    broken = examine(nodes / "glow.py")
     assert any(problem.severity == "error" for problem in broken.problems)
 
 

@@ -27,6 +27,7 @@ def drawn(name: str, folder: Path, **environment: str) -> tuple[int, Path, str]:
     return done.returncode, path, done.stderr
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("name", ["shading-unlit", "shading-flat", "forward", "deferred", "shadow-vsm"])
 def test_zink_draws_the_same(name: str, tmp_path: Path) -> None:
     (tmp_path / "run").mkdir(mode=0o700)

@@ -21,14 +21,25 @@ def shown(name: str, catalog: Catalog) -> str:
     return text
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", TYPES)
-def test_an_example_runs_and_uses_the_node(gl: Any, tmp_path: Path, name: str) -> None:
-    file = tmp_path / "example.yaml"
+def example(name: str, folder: Path) -> rg.Pipeline:
+    file = folder / "example.yaml"
     file.write_text(shown(name, Catalog.discover()), encoding="utf-8")
-    pipeline = rg.load(file, scene="glass", size=(48, 27))  # it has surfaces of every kind
-    frame = gl.render(pipeline, warm_up=False)
-    assert [node.id for node in pipeline.link().graph.nodes if node.type.name == name and node.id not in frame.culled]
+    return rg.load(file, scene="glass", size=(48, 27))  # it has surfaces of every kind
+
+
+@pytest.mark.parametrize("name", TYPES)
+def test_an_example_is_valid_and_uses_the_node(tmp_path: Path, name: str) -> None:
+    pipeline = example(name, tmp_path)
+    culled = pipeline.plan().schedule.culled
+    assert [node.id for node in pipeline.link().graph.nodes if node.type.name == name and node.id not in culled]
+
+
+@pytest.mark.slow
+@pytest.mark.nightly(keep=8)
+@pytest.mark.parametrize("name", TYPES)
+def test_an_example_runs(gl: Any, tmp_path: Path, name: str) -> None:
+    frame = gl.render(example(name, tmp_path), warm_up=False)
+    assert any(picture.any() for picture in frame.values())
 
 
 # --- types that no shipped pipeline uses -----------------------------------------------------------------------------
