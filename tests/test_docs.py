@@ -195,6 +195,25 @@ def generated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
+def test_a_pipeline_that_looks_like_its_base_is_shown_where_they_differ(
+    gl: rg.Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rendergraph.images import read
+
+    monkeypatch.syspath_prepend(str(DOCS))
+    pictures: Any = importlib.import_module("_generate.pictures")
+    studio = pictures.Studio(tmp_path)
+    monkeypatch.setattr(studio, "_session", gl)
+    assert studio.draw_difference(rg.load("shadow-pcf"), rg.load("shadow-map"), "map.png") == "map.png"
+    shown = read(tmp_path / "map.png")[..., :3].astype(int)
+    (width, height), times = pictures.SHOWN, pictures.ENLARGED
+    assert shown.shape == (height * times, 2 * width * times + 6, 3)
+    assert np.abs(shown[:, : width * times] - shown[:, -width * times :]).mean() > 1
+    for base, alike in (("forward", "forward-prepass"), ("forward", "ibl")):  # no difference to see, another scene
+        assert studio.draw_difference(rg.load(base), rg.load(alike), "none.png") is None
+
+
+@pytest.mark.slow
 def test_every_node_type_has_its_page(generated: Path) -> None:
     from rendergraph.catalog import Catalog
 

@@ -13,6 +13,7 @@ import numpy.typing as npt
 import yaml
 
 import rendergraph as rg
+from rendergraph import images
 from rendergraph.catalog import Catalog
 from rendergraph.errors import DeviceError, InputError
 from rendergraph.link.graph import Endpoint
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
 
 SIZE = (480, 270)
 SMALL = (96, 54)
+SHOWN, ENLARGED = (120, 90), 3
+"""The part of a picture that is shown beside the same part of another one, and how many times it is enlarged."""
+ALIKE, VISIBLE = 4.0, 0.35
+"""Mean difference in 255ths up to which two pictures look alike, and from which on an enlarged part does not."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +109,39 @@ class Studio:
         frame.save(path, name)
         self.written.add(path)
         return file
+
+    def draw_difference(self, base: rg.Pipeline, pipeline: rg.Pipeline, file: str) -> str | None:
+        """The part in which two pictures that look alike differ most, of both beside each other and enlarged.
+
+        Returns:
+            The path; None where the pictures show different scenes, look the same, or plainly differ as a whole.
+        """
+        if self._session is None or self._folder is None or base.link().spec.scene != pipeline.link().spec.scene:
+            return None
+        drawn = [
+            self._session.render(with_maps(one.with_size(SIZE), 1024), outputs=["image"], warm_up=False)["image"]
+            for one in (base, pipeline)
+        ]
+        difference = np.abs(drawn[0].astype(float) - drawn[1]).max(-1)
+        part = _most_different(difference)
+        if difference.mean() > ALIKE or difference[part].mean() < VISIBLE:
+            return None
+        shown = [np.repeat(np.repeat(image[part][..., :3], ENLARGED, 0), ENLARGED, 1) for image in drawn]
+        gap = np.full((shown[0].shape[0], 6, 3), 255, np.uint8)
+        path = self._folder / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        images.write(path, np.concatenate([shown[0], gap, shown[1]], 1))
+        self.written.add(path)
+        return file
+
+
+def _most_different(difference: npt.NDArray[np.float64]) -> tuple[slice, slice]:
+    """The rows and columns of the window in which most differs."""
+    width, height = SHOWN
+    sums = np.pad(difference.cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+    windows = sums[height:, width:] - sums[:-height, width:] - sums[height:, :-width] + sums[:-height, :-width]
+    y, x = np.unravel_index(windows.argmax(), windows.shape)
+    return slice(y, y + height), slice(x, x + width)
 
 
 def with_maps(pipeline: rg.Pipeline, side: int) -> rg.Pipeline:

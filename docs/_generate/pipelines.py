@@ -42,9 +42,15 @@ def pages(studio: Studio) -> Iterator[tuple[str, str]]:
 def _entry(file: Path, command: str, pipeline: rg.Pipeline, studio: Studio, *, graph: bool) -> str:
     text = file.read_text(encoding="utf-8")
     parts = [f"## {file.stem}", _comment(text)]
-    picture = studio.draw(pipeline, f"pictures/{'pipeline' if graph else 'scene'}-{file.stem}.png")
+    name = f"pictures/{'pipeline' if graph else 'scene'}-{file.stem}.png"
+    base = re.search(r"^extends: ([\w-]+)$", text, re.MULTILINE)
+    picture = studio.draw_difference(rg.load(base[1]), pipeline, name) if base else None
+    if base and picture:
+        command = f"`rendergraph run {base[1]}` and `{command}`, where they differ most"
+    else:
+        picture, command = studio.draw(pipeline, name), f"`{command}`"
     if picture:
-        parts.append(f"```{{figure}} /reference/generated/{picture}\n:alt: {file.stem}\n\n`{command}`\n```")
+        parts.append(f"```{{figure}} /reference/generated/{picture}\n:alt: {file.stem}\n\n{command}\n```")
     parts.append(folded(f"<code>{file.name}</code>", block(text, "yaml")))
     if graph:
         parts.append(folded("graph", f'<div class="graph">\n{_svg(pipeline)}\n</div>\n'))
