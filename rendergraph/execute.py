@@ -214,6 +214,12 @@ class Runner(Struct, eq=False):
             before = perf_counter()
             self._update(node, index, time, camera, self._scene)
             updates[node.id] = perf_counter() - before
+        stale = {key: values for key, values in executable.uploads.items() if values.is_stale}
+        for key, values in stale.items():
+            with _blamed(self.graph[key[0]], "the function of an upload"):
+                values.compute()
+        if stale:
+            executable.computed(stale)
         executable.updated()
         if not self._complete:
             self._check_views()

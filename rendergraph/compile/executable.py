@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from rendergraph.compile.culling import SceneView
     from rendergraph.compile.gpu_scene import GpuScene
     from rendergraph.compile.memory import Memory
+    from rendergraph.compile.uploads import UploadedValues
     from rendergraph.compile.views import ViewBuffers
     from rendergraph.gl.device import Device
     from rendergraph.gl.queries import OcclusionQuery, Timer
@@ -102,6 +103,7 @@ class CompiledStep(Struct, eq=False):
     def values(self, step: Step) -> dict[str, Any]:
         """The uniforms of a step like this one that any of its programs looks at."""
         seen = {name for draw in self.all_draws for name in draw.program.uniforms}
+        seen |= {"values"} if self.step.kind == "upload" else set()
         return {name: value for name, value in step_uniforms(step).items() if name in seen}
 
 
@@ -128,6 +130,7 @@ class Executable(Struct, eq=False, dict=True):
         filled_before: the buffers among them that this drawing has not written yet.
         touched: the sources that have changed since the last frame, as `_looks` names them, but for the scene's.
         buffers: draw commands.
+        uploads: values that the CPU gives textures and buffers, by the steps that upload them.
         vertex_arrays: frees the vertex arrays over the plan's own buffers.
         fresh: `statics` have to be written and everything bound before the next frame.
         looks_back: a program looks at where things were in the frame before.
@@ -148,6 +151,7 @@ class Executable(Struct, eq=False, dict=True):
     timers: list[Timer] = field(default_factory=list)
     occlusion_queries: list[OcclusionQuery] = field(default_factory=list)
     buffers: list[moderngl.Buffer] = field(default_factory=list)
+    uploads: Mapping[StepKey, UploadedValues] = field(default_factory=dict)
     vertex_arrays: Call = bool
     fresh: bool = True
     looks_back: bool = False
@@ -218,6 +222,13 @@ class Executable(Struct, eq=False, dict=True):
         if now != before:
             self.filled[id] = now
             self.touched.add(("buffer", id))
+
+    def computed(self, steps: Collection[StepKey]) -> None:
+        """Let upload steps whose values have been computed anew run, and the kept steps that start from them."""
+        self.touched |= {("step", key) for key in steps}
+        if kept := self.kept.keys() & steps:
+            self.due = self._with_dependents(self.due | kept)
+            self.assemble()
 
     def updated(self) -> None:
         """All nodes have been updated: note the regions and buffers that are others than in the frame before."""

@@ -116,6 +116,8 @@ def contents(executable: Executable) -> Mapping[str, Content]:
             if more == ids:
                 break
             ids = more
+        if any(executable.uploads[key].upload.sources for key in makers if key in executable.uploads):
+            continue  # made of a scene that changes
         environment = any(resources[other].role == "scene" for other in ids)
         found[id] = (
             id,

@@ -22,6 +22,7 @@ from rendergraph.compile.memory import Call, Memory, Region, TexturePool, clear_
 from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.transfers import clear_buffer, image_calls, transfer_calls
 from rendergraph.compile.units import Units
+from rendergraph.compile.uploads import UploadedValues
 from rendergraph.compile.views import FIXED_BLOCKS, ViewBuffers
 from rendergraph.expand import ViewTable
 from rendergraph.gl import state as gl_state
@@ -102,6 +103,7 @@ class _Compiler(Struct, eq=False, dict=True):
             step.key: OcclusionQuery(self.device) for step in self.plan.schedule.steps if step.key in asked
         }
         self.looks_back = False
+        self._uploads: dict[tuple[str, int], UploadedValues] = {}
         # Where a texture takes a block over: the driver, which knows of no sharing, has to be done with the others.
         self._takeovers = {
             self.plan.lifetimes[id].first for block in self.plan.physicals if block.block for id in block.members
@@ -117,6 +119,7 @@ class _Compiler(Struct, eq=False, dict=True):
         made = Executable(self.device, self.plan, self.memory, self.views, self.scene, binds, steps)
         made.scene_views = list(self.geometry.views.values())
         made.buffers = list(self.geometry.buffers)
+        made.uploads = self._uploads
         made.vertex_arrays = partial(self.programs.forget, id(self.memory))
         made.looks_back = self.looks_back or self.views.looks_back
         made.timers = [Timer(self.device) for _ in self.plan.schedule.steps]
@@ -133,6 +136,7 @@ class _Compiler(Struct, eq=False, dict=True):
             "geometry": self._geometry,
             "draw": self._draw,
             "compute": self._compute,
+            "upload": self._upload,
         }
         drawing.get(step.kind, self._transfer)(step, compiled, parity)
         if step.shaders:
@@ -260,6 +264,10 @@ class _Compiler(Struct, eq=False, dict=True):
         else:
             call = partial(program.object.run, *groups_of(step, program.local_size, self.device.limits))
         compiled.draws.append(Draw(program, uniforms, None, call, binds))
+
+    def _upload(self, step: Step, compiled: CompiledStep, parity: int) -> None:
+        values = self._uploads.setdefault(step.key, UploadedValues(compiled, self.scene, self.memory))
+        compiled.before.append(partial(values.write, parity))
 
     def _transfer(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         compiled.before += transfer_calls(self.device, self.memory, step, parity)

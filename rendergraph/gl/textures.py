@@ -208,21 +208,22 @@ def _resolved(device: Device, texture: GpuTexture) -> GpuTexture:
     return made
 
 
-def upload(device: Device, texture: GpuTexture, texels: npt.NDArray[Any], *, mip: int = 0) -> None:
+def upload(
+    device: Device, texture: GpuTexture, texels: npt.NDArray[Any], *, mip: int = 0, layer: int | None = None
+) -> None:
     """Write (layers, height, width, channels) or (height, width, channels) into one mip, rows in the order given."""
     desc = texture.desc
     width, height = desc.mip_size(mip)
     gl_format, gl_type, dtype, channels = transfer_format(desc.format)
     data = np.ascontiguousarray(texels, dtype)
-    layers = desc.mip_layers(mip)
+    first, layers = (0, desc.mip_layers(mip)) if layer is None else (layer, 1)
     assert data.size == width * height * layers * channels, (data.shape, desc)
     device.raw.glPixelStorei(0x0CF5, 1)
+    given = gl_format, gl_type, data.ctypes.data
     if desc.kind == "texture2d":
-        device.raw.glTextureSubImage2D(texture.glo, mip, 0, 0, width, height, gl_format, gl_type, data.ctypes.data)
+        device.raw.glTextureSubImage2D(texture.glo, mip, 0, 0, width, height, *given)
     else:
-        device.raw.glTextureSubImage3D(
-            texture.glo, mip, 0, 0, 0, width, height, layers, gl_format, gl_type, data.ctypes.data
-        )
+        device.raw.glTextureSubImage3D(texture.glo, mip, 0, 0, first, width, height, layers, *given)
 
 
 def texel(value: float | tuple[float, ...], channels: int, dtype: Any) -> npt.NDArray[Any]:

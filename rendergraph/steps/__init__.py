@@ -17,6 +17,7 @@ from rendergraph.steps.model import Resource as Resource
 from rendergraph.steps.model import Role as Role
 from rendergraph.steps.model import Step as Step
 from rendergraph.steps.model import UniformValue as UniformValue
+from rendergraph.steps.model import Upload as Upload
 from rendergraph.steps.model import Use as Use
 from rendergraph.steps.model import Where as Where
 from rendergraph.steps.model import Write as Write

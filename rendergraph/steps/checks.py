@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache, wraps
 from typing import Annotated, Any, ParamSpec, TypeAlias
 
+import numpy as np
+import numpy.typing as npt
 from msgspec.structs import replace
 
 from rendergraph.errors import Misuse, nearest, suggestion
@@ -84,6 +86,33 @@ def check_part(part: Part, desc: TextureDesc | BufferDesc) -> None:
         raise Misuse(f"'{part.port.name}' is a buffer, which has no mips and no layers")
     if missing := desc.lacks(part.mip, part.layer):
         raise Misuse(f"'{part.port.name}' {missing}")
+
+
+def texels(
+    name: str, values: object, desc: TextureDesc | BufferDesc | None, mip: int | None = None, layer: int | None = None
+) -> npt.NDArray[Any]:
+    """Return values for an upload as (layers, height, width, channels), or as the bytes of a buffer.
+
+    Raises:
+        Misuse: they are not numbers, or do not fill the texture or fit the buffer.
+    """
+    array = np.asarray(values)
+    if array.dtype.kind not in "biuf":
+        raise Misuse(f"'{name}' is given {type(values).__name__} of {array.dtype}, not an array of numbers")
+    if isinstance(desc, BufferDesc):
+        if array.nbytes > desc.bytes:
+            raise Misuse(f"'{name}' is given {array.nbytes} bytes, but it holds {desc.bytes}", "RG432")
+        return np.frombuffer(array.tobytes().ljust(desc.bytes, b"\0"), np.uint8)
+    if desc is None:
+        return array
+    texel, layers = FORMATS[desc.format], 1 if layer is not None else desc.mip_layers(mip or 0)
+    shape = (layers, *desc.mip_size(mip or 0)[::-1], texel.components)
+    if desc.samples > 1 or [side for side in array.shape if side > 1] != [side for side in shape if side > 1]:
+        text = f"'{name}' takes {' × '.join(map(str, shape))} numbers (layers, height, width, channels)"
+        raise Misuse(f"{text}, got an array of shape {array.shape}", "RG432")
+    if texel.is_bytes and array.dtype.kind == "f":
+        array = np.rint(255 * np.clip(array, 0.0, 1.0)).astype(np.uint8)
+    return array.reshape(shape)
 
 
 def targets(ports: Mapping[str, Port], out: object) -> dict[str, Part]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 from msgspec import Struct
 
@@ -145,7 +145,7 @@ class Step(Struct, frozen=True, gc=False):
 
     node: str
     index: int
-    kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps", "resolve", "copy"]
+    kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps", "resolve", "copy", "upload"]
     shaders: tuple[tuple[str, str], ...] = ()
     reads: tuple[Read, ...] = ()
     writes: tuple[Write, ...] = ()
@@ -199,6 +199,31 @@ class Step(Struct, frozen=True, gc=False):
         if not self.functions:
             return self.reads
         return self.reads + tuple(read for function in self.functions for read in function.reads)
+
+
+SceneSource = Literal["transforms", "lights", "materials", "environment"]
+
+
+class Upload(Struct, frozen=True, eq=False):
+    """Values that the CPU gives a texture or buffer: an array, or a function of the scene.
+
+    Attributes:
+        sources: what of the scene the function looks at.
+        content: equal for equal values.
+    """
+
+    values: Any
+    sources: tuple[SceneSource, ...] = ()
+    content: str = ""
+
+    def __eq__(self, other: object) -> bool:
+        return repr(self) == repr(other)
+
+    def __hash__(self) -> int:
+        return hash(self.content)
+
+    def __repr__(self) -> str:
+        return f"Upload({self.content})"
 
 
 Role = Literal["transient", "internal", "output", "history", "kept", "scene"]

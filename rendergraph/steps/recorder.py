@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from hashlib import sha1
 from types import FrameType
 from typing import Annotated, Any, Literal, Protocol, TypeAlias
 
@@ -14,7 +15,7 @@ from rendergraph.facts import Facts, LightFacts
 from rendergraph.ports import Count, InOut, Input, Output, Part, Port, Positive, Shader, Texel, Views
 from rendergraph.steps import checks
 from rendergraph.steps.checks import Counts, Macro, checked
-from rendergraph.steps.model import DrawOrder, MaterialLevel, Topology, UniformValue
+from rendergraph.steps.model import DrawOrder, MaterialLevel, SceneSource, Topology, UniformValue, Upload
 from rendergraph.steps.state import State
 from rendergraph.textures import BufferDesc, TextureDesc
 from rendergraph.typecheck import quoted
@@ -55,7 +56,7 @@ class StepRequest(Struct, frozen=True, gc=False):
     `caller` is the author's file and line of the call, None if the framework recorded the step itself.
     """
 
-    kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps", "resolve"]
+    kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps", "resolve", "upload"]
     shaders: tuple[tuple[str, str], ...] = ()
     out: tuple[tuple[str, Part], ...] = ()
     bindings: Mapping[str, Port | Part] = field(default_factory=dict)
@@ -316,6 +317,40 @@ class Steps:
         if getattr(part.port, "kind", "") == "buffer" and numbers != 0:
             raise Misuse(f"'{part.port.name}' is a buffer, which can only be cleared to 0")
         self._add("clear", {}, out, {}, None, value=numbers)
+
+    @checked
+    def upload(self, out: Target, values: Any, *, changes_with: Sequence[SceneSource] = (), label: str = "") -> None:
+        """Give a texture or buffer values from the CPU.
+
+        They are computed once, and again when a parameter of the node or something in `changes_with` has changed. They
+        are uploaded when that happens, or when the memory has been used for something else; with `kept=True` it is not.
+
+        Args:
+            out: a port, or a mip or layer of it.
+            values: an array, or a function that takes a `FrameScene` and returns one. For a texture its shape is
+                (height, width, channels), behind the layers or the depth if there are several; axes of length 1 may be
+                left out. `values[y, x]` is what `texelFetch` reads at (x, y). Formats with 8-bit channels take bytes,
+                or floats from 0 to 1. A buffer takes an array of any shape, in its own type.
+            changes_with: what of the scene the function looks at: `transforms`, `lights`, `materials`, `environment`.
+            label: see the class.
+        """
+        part = checks.part_of(self.ports, out, "out")
+        targets = checks.targets(self.ports, part)
+        desc = self._desc(part.port)
+        if desc is not None:
+            checks.check_part(part, desc)
+        if callable(values):
+            content = f"{getattr(values, '__module__', '')}.{getattr(values, '__qualname__', id(values))}"
+            owner = getattr(values, "__self__", None)
+            content += f" of {owner!r}" if owner is not None else f" at {id(values):#x}"
+        else:
+            values = checks.texels(part.port.name, values, desc, part.mip, part.layer)
+            content = f"{values.dtype} {values.shape} {sha1(values.tobytes()).hexdigest()}"
+        given: dict[str, Any] = {"values": Upload(values, tuple(changes_with), content)}
+        out_of = tuple(targets.items())
+        self._recorder.add(
+            StepRequest("upload", out=out_of, uniforms=given, options={"label": label}, caller=_caller())
+        )
 
     def mipmaps(self, out: Port) -> None:
         """Make mips 1 and up from mip 0 by 2×2 averages."""

@@ -1,0 +1,68 @@
+"""Values that the CPU gives textures and buffers, computed again only where what they are made of has changed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy.typing as npt
+from msgspec import Struct
+
+from rendergraph.compile.executable import CompiledStep
+from rendergraph.compile.gpu_scene import GpuScene
+from rendergraph.compile.memory import Memory
+from rendergraph.gl import textures
+from rendergraph.scene.facts import FrameScene
+from rendergraph.steps import Upload
+from rendergraph.steps.checks import texels
+
+_CHANGES = {
+    "transforms": "instances",
+    "lights": "light_block",
+    "materials": "material_block",
+    "environment": "environment_block",
+}
+
+
+class UploadedValues(Struct, eq=False):
+    """The values of one upload step."""
+
+    compiled: CompiledStep
+    scene: GpuScene
+    memory: Memory
+    _array: npt.NDArray[Any] | None = None
+    _made_of: object = None
+
+    @property
+    def is_stale(self) -> bool:
+        """Whether the values have to be computed, for the first time or again."""
+        return self._made_of != self._sources
+
+    @property
+    def _sources(self) -> object:
+        upload = self.upload
+        return upload, [self.scene.changes[_CHANGES[source]] for source in upload.sources]
+
+    @property
+    def upload(self) -> Upload:
+        """What the step uploads, with today's parameters of its node."""
+        found = dict(self.compiled.step.uniforms)["values"]
+        assert isinstance(found, Upload)
+        return found
+
+    def compute(self) -> None:
+        """Compute the values; what a third-party function raises is passed on."""
+        values, (write,) = self.upload.values, self.compiled.step.writes
+        if callable(values):
+            desc = self.memory.plan.resources[write.resource].desc
+            values = texels(write.name, values(FrameScene(self.scene.scene)), desc, write.mip, write.layer)
+        self._array, self._made_of = values, self._sources
+
+    def write(self, parity: int) -> None:
+        """Upload the values."""
+        (write,) = self.compiled.step.writes
+        assert self._array is not None
+        if write.use == "buffer":
+            self.memory.buffer(write.resource, parity).write(self._array.tobytes())
+        else:
+            texture = self.memory.texture(write.resource, parity)
+            textures.upload(self.memory.device, texture, self._array, mip=write.mip or 0, layer=write.layer)
