@@ -167,7 +167,7 @@ class Roots(Struct, frozen=True):
             if resolved.is_dir():
                 return "RG011", f"'{name}' is a folder; a file is expected"
             if resolved.is_file():
-                return "RG011", f"'{name}' is a file; a folder is expected"
+                return "RG011", f"'{name}' is a file; expected a folder"
             if resolved.exists():
                 return "RG011", f"'{name}' is not a regular file"
         except (OSError, ValueError, RuntimeError):

@@ -172,7 +172,7 @@ def test_there_is_a_schema_of_files_we_read_alone(capsys: pytest.CaptureFixture[
         assert main(["schema", kind]) == 0
         assert key in json.loads(capsys.readouterr().out)["properties"]
     assert main(["schema", "scenes"]) == 3
-    assert "RG511 there is no schema of 'scenes'; did you mean 'scene'?" in capsys.readouterr().err
+    assert "RG511 unknown schema 'scenes'; did you mean 'scene'?" in capsys.readouterr().err
     assert main(["schema", "missing.yaml"]) == 3
     assert "RG011 there is no file 'missing.yaml'" in capsys.readouterr().err
 

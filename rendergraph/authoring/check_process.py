@@ -25,7 +25,7 @@ from typing import Any
 
 from msgspec import ValidationError, convert, to_builtins
 
-from rendergraph.authoring.report import Report
+from rendergraph.authoring.variants import Report
 from rendergraph.catalog.types import SHADERS
 from rendergraph.declare.blame import cause_chain, describe_error, source_location
 from rendergraph.errors import DeviceError, InputError, Place, Problem, RenderError, RendergraphError, shown_file

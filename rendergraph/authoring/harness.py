@@ -165,7 +165,7 @@ def _source(name: str, port: Input | InOut, folder: Path, samples: Samples) -> t
         size=(24, 24) if port.kind == "texture_cube" else None,
         samples=samples,
         view="views",
-        lights=_first_light if _has_lights(meaning) else None,
+        lights=(lambda node, facts: (0,)) if _has_lights(meaning) else None,
         doc="A pattern.",
     )
     views = Views(count=layers, public=False, doc="The camera's view for each layer.")
@@ -174,10 +174,6 @@ def _source(name: str, port: Input | InOut, folder: Path, samples: Samples) -> t
 
 def _has_lights(semantic: Semantic) -> bool:
     return semantic.name in ("shadow_map", "visibility")
-
-
-def _first_light(node: Any, facts: Any) -> tuple[int, ...]:
-    return (0,)
 
 
 def _pattern(semantic: Semantic, format: str) -> str:

@@ -153,7 +153,7 @@ def _name_mistake(name: str, existing: Set[str]) -> str:
         better = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
         better = re.sub(r"[^a-z0-9]+", "_", better).strip("_0123456789")[:_LONGEST_NAME].strip("_")
         hint = f", such as '{better}'" if better and not _name_mistake(better, existing) else ""
-        return f"a name is up to {_LONGEST_NAME} lower-case letters, digits and single underscores{hint}"
+        return f"expected up to {_LONGEST_NAME} lower-case letters, digits and single underscores{hint}"
     other = f"; choose another, such as 'my_{name}'"
     if name in existing:
         return f"a node type of that name exists{other}"

@@ -1,4 +1,4 @@
-"""The variants of a node that a check renders: the default, then one change at a time."""
+"""The variants of a node that a check renders: the default, then one change at a time; and the report about them."""
 
 from __future__ import annotations
 
@@ -7,9 +7,23 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rendergraph.declare import InOut, Input, Node
+from rendergraph.errors import Problem
 
 MOST_VARIANTS = 200
 """Of one node; further ones are not rendered."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """The result of a check: the type's name, the rendered variants in order, mistakes and warnings."""
+
+    node: str
+    variants: tuple[str, ...]
+    problems: tuple[Problem, ...]
+
+    @property
+    def mistakes(self) -> tuple[Problem, ...]:
+        return tuple(problem for problem in self.problems if problem.severity == "error")
 
 
 @dataclass(frozen=True)

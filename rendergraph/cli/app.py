@@ -117,7 +117,7 @@ class _Verbs(click.Group):
         if args[0] not in VERBS and not args[0].startswith("-"):
             meant = _SYNONYMS.get(args[0].lower()) or (f"run {args[0]}" if _is_pipeline(args[0]) else None)
             hint = f"; did you mean '{meant}'?" if meant else suggestion(args[0], VERBS)
-            ctx.fail(f"there is no verb '{args[0]}'{hint}")
+            ctx.fail(f"unknown verb '{args[0]}'{hint}")
         return super().resolve_command(ctx, args)
 
 

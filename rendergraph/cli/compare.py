@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 BEYOND = 4
 """Exit code of a comparison that exceeds a threshold."""
 _LIMITED = ("flip", "rmse", "radiance_rmse")
-SOFTWARE = "times on a software rasteriser: no measure of a GPU"
+SOFTWARE = "times on a software rasteriser: not comparable to a GPU"
 
 
 class Threshold(Struct, frozen=True):
@@ -51,7 +51,7 @@ def check_thresholds(thresholds: Sequence[Threshold], extensions: Extensions) ->
     """Check that each threshold has a built-in metric or one of a plugin."""
     names = [*_LIMITED, *(added.name for added in extensions.metrics())]
     for metric in dict.fromkeys(one.metric for one in thresholds if one.metric not in names):
-        text = f"--fail-above: there is no metric '{metric}'{suggestion(metric, names)}"
+        text = f"--fail-above: unknown metric '{metric}'{suggestion(metric, names)}"
         raise UsageError([Problem("RG500", text), *extensions.problems])
 
 

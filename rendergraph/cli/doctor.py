@@ -123,7 +123,7 @@ def _text(report: dict[str, Any]) -> str:
             continue
         lacking = [n for n, has in device["features"].items() if not has and n not in _OPTIONAL_FEATURES]
         words = [f"OpenGL {device['gl']}", device["version"].split(" ", 1)[-1]]
-        words += ["software: no measure of a GPU"] if device["software"] else []
+        words += ["software: not comparable to a GPU"] if device["software"] else []
         words += [f"lacks {', '.join(lacking)}"] if lacking else []
         words += device.get("workarounds", [])
         words += [device[key] for key in ("render_node", "drm") if device.get(key)][:1]

@@ -37,7 +37,7 @@ Entry = dict[str, Any]
 @options.selection_options
 @options.json_option
 def command(topic: str, glsl: bool, pipeline: str | None, step: int | None, select: Select, as_json: bool) -> None:
-    """Explain a node, a pipeline, a scene, a file format or an error.
+    """Explain a node, a file, its format, or an error code.
 
     `pipeline`, `scene`, `sweep`, `settings` and `header` list every key of that kind of file. The path of a file
     explains the pipeline, scene or node in it. With --glsl, TOPIC is a node type, which is shown in a small pipeline,
@@ -58,7 +58,7 @@ def command(topic: str, glsl: bool, pipeline: str | None, step: int | None, sele
 
     plugins = select(topic).plugins
     if not glsl and (pipeline or step is not None or select(topic) != Selection(topic, plugins=plugins)):
-        raise UsageError(Problem("RG500", "--pipeline, --step and what changes a pipeline go with --glsl"))
+        raise UsageError(Problem("RG500", "--pipeline, --step and options that change a pipeline require --glsl"))
     if pipeline is not None:
         found = reference.describe_program(options.link(select(pipeline)), topic, step)
         _print(found, _program_text, as_json)
@@ -113,7 +113,7 @@ def _unknown(topic: str, types: Any, shader_suffixes: tuple[str, ...]) -> str:
     if topic in names:
         return f"'{topic}' has no program; --glsl takes a node type, or a node of --pipeline"
     hint = f"; did you mean '{shader}'?" if shader else suggestion(topic, names)
-    return f"nothing is called '{topic}'{hint}" + (
+    return f"unknown name '{topic}'{hint}" + (
         "" if shader else "; `nodes`, `pipelines`, `scenes` and `environments` list names"
     )
 

@@ -261,7 +261,7 @@ def _of_pipelines(what: str, plugins: tuple[Path, ...]) -> Schema:
     from rendergraph.schema import base_of, schema, shipped_bases
 
     if what != "pipeline" and not Path(what).suffix:
-        text = f"there is no schema of '{what}'{suggestion(what, _KINDS)}"
+        text = f"unknown schema '{what}'{suggestion(what, _KINDS)}"
         raise InputError(Problem("RG511", text))
     catalog = Catalog.discover(plugins)
     warn(catalog.notes)

@@ -81,7 +81,7 @@ def nodes(family: str | None, plugins: tuple[Path, ...], as_json: bool) -> None:
     warn(catalog.notes)
     families = catalog.families()
     if family is not None and family not in families:
-        text = f"there is no family of nodes '{family}'{suggestion(family, filter(None, families))}"
+        text = f"unknown family of nodes '{family}'{suggestion(family, filter(None, families))}"
         raise InputError(Problem("RG511", text))
     names = (name for key, members in families.items() if family in (None, key) for name in members)
     found, problems = catalog.usable(names)

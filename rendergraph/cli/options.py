@@ -334,21 +334,6 @@ def exit_if_missing(*sketches: Linked) -> None:
         click.get_current_context().exit(InputError.exit_code)
 
 
-def words(selection: Selection) -> list[str]:
-    """The options that make a selection, so that a report can say how to get it again."""
-    found: list[str] = []
-    for name, option in (("scene", "--scene"), ("camera", "--camera"), ("environment", "--environment")):
-        if (value := getattr(selection, name)) is not None:
-            found += [option, str(value)]
-    if size := selection.size:
-        found += ["--size", f"{size[0]}x{size[1]}"]
-    many = {"sets": "-s", "patches": "-p", "asset_roots": "--asset-root", "plugins": "--plugin"}
-    found += [
-        word for name, option in many.items() for value in getattr(selection, name) for word in (option, str(value))
-    ]
-    return [*found, *(word for name, most in selection.limits for word in ("--limit", f"{name}={most}"))]
-
-
 def command_line() -> str:
     """Return the running command line as it was typed, to repeat it, without options that concern this run alone."""
     import shlex

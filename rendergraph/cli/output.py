@@ -128,7 +128,7 @@ def say_summary(report: dict[str, Any]) -> None:
     passes = amount(len(report["passes"]), "pass", "passes")
     ms = f"{report['frame_ms']['median']:.1f} ms"
     text = f"{width}×{height}, {passes}, {f'drawn in {ms}' if len(report['steps_run']) == 1 else f'{ms} a frame'}"
-    say(f"{text} on {device['renderer']}" + (" (software: no measure of a GPU)" if device["software"] else ""))
+    say(f"{text} on {device['renderer']}" + (" (software: not comparable to a GPU)" if device["software"] else ""))
 
 
 def print_error(problems: Sequence[Problem], exit_code: int, *, as_json: bool) -> None:

@@ -274,7 +274,7 @@ def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path])
     linked, numbers = expanded.linked, expanded.options.frames
     for name, port in expanded.requests.items():
         if linked.graph.textures[port.end].desc is None:
-            text = f"'{name}' is a buffer, which no picture file holds; from Python it is frame['{name}']"
+            text = f"'{name}' is a buffer, which picture files cannot store; read it in Python as frame['{name}']"
             raise InputError(Problem("RG508", text))
     selection = linked.selection
     named = [Path(name) for name in (selection.source, selection.scene, selection.environment) if name]

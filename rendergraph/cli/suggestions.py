@@ -49,7 +49,7 @@ def unknown_option(error: click.NoSuchOption, context: click.Context) -> str:
     name = error.option_name
     if not name.startswith("--"):  # click found only the first letter of `-width`
         name = next((word for word in context.obj or () if word.startswith(name)), name)
-    return f"there is no option '{name}'{_meant(name, context)}"
+    return f"unknown option '{name}'{_meant(name, context)}"
 
 
 def _meant(name: str, context: click.Context) -> str:

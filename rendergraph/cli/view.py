@@ -77,8 +77,10 @@ def command(
     from rendergraph.viewer.view_state import ViewState
 
     if host not in LOOPBACK and not allow_remote:
-        text = f"'{host}' is not this machine alone: anyone who learns the address can use the page, unencrypted; "
-        raise UsageError(Problem("RG500", text + "pass --allow-remote if you mean it, or use an SSH tunnel"))
+        text = (
+            f"'{host}' accepts connections from other machines: anyone with the address can use the page, unencrypted; "
+        )
+        raise UsageError(Problem("RG500", text + "pass --allow-remote to allow this, or use an SSH tunnel"))
     with contextlib.closing(RenderProcess(device, timeout)) as process:
         if export is None:
             process.start()  # while the files are read

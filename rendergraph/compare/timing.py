@@ -86,7 +86,10 @@ def times_of(frames: Sequence[FrameTimes], types: Mapping[str, str], names: Mapp
     order = {node: place for place, node in enumerate(dict.fromkeys(step.node for step in frames[0].steps))}
     rendered = names if names is not None else {node: node for node in order}
     nodes = sorted((node for node in rendered if rendered[node] in order), key=lambda node: order[rendered[node]])
-    costs = {node: [_cost(frame, rendered[node]) for frame in frames] for node in nodes}
+    costs = {
+        node: [_total((s.cpu_ms, s.gpu_ms) for s in frame.steps if s.node == rendered[node]) for frame in frames]
+        for node in nodes
+    }
     whole = [_total(costs[node][number] for node in nodes) for number in range(len(frames))]
     return Times(
         frames=len(frames),
@@ -122,10 +125,6 @@ def step_times(frames: Sequence[FrameTimes]) -> list[dict[str, Any]]:
         }
         for (node, index, label), values in costs.items()
     ]
-
-
-def _cost(frame: FrameTimes, node: str) -> Cost:
-    return _total((step.cpu_ms, step.gpu_ms) for step in frame.steps if step.node == node)
 
 
 def _total(costs: Iterable[Cost]) -> Cost:

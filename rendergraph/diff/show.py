@@ -10,7 +10,7 @@ from typing import Any
 from msgspec import to_builtins
 from msgspec.structs import asdict, replace
 
-from rendergraph.diagrams import Card, Link, Mark, Sheet, draw, sheet
+from rendergraph.diagrams import Link, Mark, Sheet, draw, sheet
 from rendergraph.diff.structure import GraphDiff, PlanFigures
 from rendergraph.formatting import format_bytes, format_value, jsonable, table
 from rendergraph.link import Graph
@@ -115,8 +115,11 @@ def _both(a: Graph, b: Graph, difference: GraphDiff) -> tuple[Sheet, dict[str, M
     old_cards = {names[card.id]: card for card in old.cards}
     removed = [_backwards(link, new.links) for link in old_links if link not in new.links]
     for link in removed:  # a node of another type may lack the port that was linked
-        cards[link.source] = _with_output(cards[link.source], link.source_port, old_cards[link.source])
-        cards[link.target] = _with_input(cards[link.target], link.target_port, old_cards[link.target])
+        for id, ports, name in ((link.source, "outputs", link.source_port), (link.target, "inputs", link.target_port)):
+            sockets = getattr(cards[id], ports)
+            if all(socket.name != name for socket in sockets):
+                own = next(socket for socket in getattr(old_cards[id], ports) if socket.name == name)
+                cards[id] = replace(cards[id], **{ports: (*sockets, own)})
     highlights = {link: ADDED for link in new.links if link not in old_links} | dict.fromkeys(removed, f"-{REMOVED}")
     marks = {new: Mark(RENAMED, (f"was {old}",)) for old, new in difference.renamed.items()}
     marks |= {change.node: Mark(CHANGED) for change in difference.links if change.node in cards}
@@ -136,17 +139,6 @@ def _backwards(link: Link, present: Sequence[Link]) -> Link:
         reached |= following
         waiting += following
     return replace(link, previous=link.previous or link.source in reached)
-
-
-def _with_input(card: Card, port: str, old: Card) -> Card:
-    """Return the card with the port of the old card, if it lacks it."""
-    present = {socket.name for socket in card.inputs}
-    return replace(card, inputs=(*card.inputs, *(s for s in old.inputs if s.name == port and port not in present)))
-
-
-def _with_output(card: Card, port: str, old: Card) -> Card:
-    present = {socket.name for socket in card.outputs}
-    return replace(card, outputs=(*card.outputs, *(s for s in old.outputs if s.name == port and port not in present)))
 
 
 def _legend(y: float) -> list[str]:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct
 
-from rendergraph.catalog import NodeType
 from rendergraph.errors import shown_file
 from rendergraph.formatting import format_value
 from rendergraph.link import Endpoint, Graph, GraphNode
@@ -116,7 +115,10 @@ def diff(a: Graph, b: Graph) -> GraphDiff:
         disabled=(*(node for node in removed if node in b.disabled), *(node for node in added if node in a.disabled)),
         renamed={old: new for old, new in nodes.items() if old != new},
         retyped=tuple(
-            _retyped(new, a[old].type, b[new].type) for old, new in nodes.items() if not _same_type(a[old], b[new])
+            Retyped(new, x.name, y.name, (shown_file(x.file), shown_file(y.file)) if x.name == y.name else None)
+            for old, new in nodes.items()
+            if not _same_type(a[old], b[new])
+            for x, y in ((a[old].type, b[new].type),)
         ),
         links=tuple(_links(a, b, nodes)),
         parameters=tuple(change for old, new in nodes.items() for change in _parameters(a[old], b[new])),
@@ -187,11 +189,6 @@ def _same_type(a: GraphNode, b: GraphNode) -> bool:
     if a.type.is_shader and b.type.is_shader:
         return a.type.text == b.type.text
     return (a.type.name, a.type.file) == (b.type.name, b.type.file)
-
-
-def _retyped(node: str, old: NodeType, new: NodeType) -> Retyped:
-    files = (shown_file(old.file), shown_file(new.file)) if old.name == new.name else None
-    return Retyped(node, old.name, new.name, files)
 
 
 # --- what differs ----------------------------------------------------------------------------------------------------

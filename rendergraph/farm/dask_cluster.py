@@ -23,13 +23,13 @@ Cluster: TypeAlias = Any
 Future: TypeAlias = Any
 
 CONNECT_SECONDS = 10.0
-"""For a scheduler to answer, and to come back."""
+"""For a scheduler to answer, and to answer again."""
 COPIES = 2
 """Workers that hold uploaded content before any task needs it, so that the loss of one loses nothing."""
 _POLL = 0.25
 _RESUME = "finished runs are saved; continue with --resume"
 _WORKER_LEAVES = (OSError, KeyError, ValueError)
-"""What Dask's scheduler raises where a worker goes while content is sent to it; there is no class for that."""
+"""Raised by Dask's scheduler if a worker leaves while content is sent to it; Dask has no class for that."""
 
 
 def start_local_cluster(count: int, devices: Sequence[int | None], *, timeout: float) -> Dask:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 ExecutorChoice: TypeAlias = "str | Executor | Any | None"
 """A name, an executor, a Dask `Client`; None leaves the choice to the size of the work."""
 ENOUGH_CORES = 4
-"""A software rasteriser takes all cores by itself: on fewer than these, further processes cost what they gain."""
+"""A software rasteriser uses all cores: on fewer than these, more processes gain nothing."""
 _NAMES = "serial, processes, processes:N, dask, dask:N, dask://HOST:PORT"
 _NAME = re.compile(r"serial|(processes|dask)(?::([1-9][0-9]{0,3}))?|dask://[^\s/]+:[0-9]{1,5}")
 _MOST_WORKERS = 1024

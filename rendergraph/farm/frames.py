@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from rendergraph.session.values import Expanded
 
 CHUNKS_PER_WORKER = 4
-"""Enough that none waits long for the last, few enough that programs are seldom compiled."""
+"""Enough that no worker waits long for the last, few enough that programs are rarely compiled."""
 LONGEST_CHUNK = 64
-"""Frames of a chunk: what is lost with a worker."""
+"""Frames of a chunk: the work that is lost with a worker."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rendergraph.session.gpu import Gpu
 
 ATTEMPTS = 2
-"""How often a task is begun, where the worker may be to blame for what ends it."""
+"""Attempts per task, if the worker may be the cause of a failure."""
 _DEVICE_CODES = frozenset({"RG612", "RG613", "RG614", "RG616"})
 """Errors that may differ on another device, or when less is done at once: memory, read-back, driver."""
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rendergraph.farm.tasks import Task
 
 TIMEOUT = 600.0
-"""Seconds without a message before a worker is taken to hang."""
+"""Seconds without a message before a worker is replaced."""
 STARTUP_TIMEOUT = 120.0
 """Seconds until the first message, at least: the process starts, imports, opens its device, and compiles."""
 _PR_SET_PDEATHSIG = 1

@@ -190,7 +190,11 @@ def _text(node_type: NodeType, base: Graph, links: Links, reader: tuple[str, str
     id_ = node_type.word if all(node.id != node_type.word for node in base.nodes) else "example"
     inputs = f", inputs: {_flow(links)}" if links else ""
     lines = [f"extends: {base.name}", "nodes:", f"  {id_}: {{type: {node_type.name}{inputs}}}"]
-    textures = {name: port for name, port in node_type.cls.outputs().items() if _is_texture(port)}
+    textures = {
+        name: port
+        for name, port in node_type.cls.outputs().items()
+        if str(getattr(port, "kind", "")).startswith("texture") and not isinstance(port, Function)
+    }
     replaced = _replaced_outputs(textures, base, links)
     outputs = {name: f"{id_}.{out}" for name, out in replaced.items()}
     if reader is not None:
@@ -213,10 +217,6 @@ def _replaced_outputs(textures: Mapping[str, Port], base: Graph, links: Links) -
         if like or alike:
             changed[name] = (like or alike)[0]
     return changed
-
-
-def _is_texture(port: Port) -> bool:
-    return not isinstance(port, Function) and str(getattr(port, "kind", "")).startswith("texture")
 
 
 def _flow(table: Mapping[str, str]) -> str:

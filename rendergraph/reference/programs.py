@@ -29,7 +29,7 @@ def find_node_of_type(node_type: NodeType, catalog: Catalog, select: Callable[[s
 
     text = example_file(node_type, catalog)
     if text is None:
-        text = f"no shipped pipeline shows '{node_type.name}'; name one that does with --pipeline, and the node's id"
+        text = f"no shipped pipeline uses '{node_type.name}'; name one with --pipeline, and the node's id"
         raise InputError(Problem("RG511", text))
     names = [name for name, file in shipped_pipelines().items() if file.read_text(encoding="utf-8") == text]
     patch = {} if names else yaml.safe_load(text)
@@ -56,7 +56,7 @@ def describe_program(linked: Linked, node: str, number: int | None) -> dict[str,
     first = (each_frame or steps)[0]
     step = first if number is None else next((one for one in steps if one.index == number), None)
     if step is None:
-        listed = ", ".join(_step_name(one) for one in steps)
+        listed = ", ".join(f"{s.index} ({s.label or ', '.join(name for _, name in s.shaders)})" for s in steps)
         text = f"--step: '{node}' has no step {number} with a program; available: {listed}"
         raise UsageError(Problem("RG500", text))
     return _describe(linked, expansion, steps, step)
@@ -112,10 +112,6 @@ def _describe(linked: Linked, expansion: Expansion, steps: list[Step], step: Ste
             for stage, text in texts.items()
         },
     }
-
-
-def _step_name(step: Step) -> str:
-    return f"{step.index} ({step.label or ', '.join(name for _, name in step.shaders)})"
 
 
 def _origins(text: Any) -> list[dict[str, Any]]:

@@ -62,6 +62,6 @@ def error_page(code: str) -> dict[str, Any]:
 
     path = next(folder("rendergraph.errors").glob(f"{code}-*.yaml"), None)
     if path is None:
-        raise InputError(Problem("RG511", f"there is no error code '{code}'{suggestion(code, error_codes())}"))
+        raise InputError(Problem("RG511", f"unknown error code '{code}'{suggestion(code, error_codes())}"))
     page: dict[str, Any] = yaml.safe_load(path.read_text(encoding="utf-8"))
     return page

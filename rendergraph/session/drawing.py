@@ -75,7 +75,7 @@ class Drawing(Struct, eq=False, dict=True):
             RenderError: the driver reported an error, an `update` failed, or something else was rendered meanwhile.
         """
         if self.gpu.cache.drawing is not self:
-            text = "the session has begun to draw something else; take all frames of one drawing before the next"
+            text = "the session has started another drawing; take all frames of one drawing before the next"
             raise RenderError(Problem("RG615", text))
         if self._remembers and camera is None:
             if number <= self.number:

@@ -62,7 +62,7 @@ class Gpu:
             return
         if threading.get_ident() != self._thread:
             raise RenderError(
-                Problem("RG615", "a session must be closed by the thread that made it; draw and close it there")
+                Problem("RG615", "a session must be closed by the thread that created it; render and close it there")
             )
         self._closed = True
         with self.device.current():
@@ -79,13 +79,13 @@ class Gpu:
         """
         text = ""
         if self._closed:
-            text = "the session is closed; draw before its `with` block ends, or make another"
+            text = "the session is closed; render before its `with` block ends, or create another"
         elif os.getpid() != self._process:
-            text = "a session stays in its process; fork before OpenGL is used, or start processes anew ('spawn')"
+            text = "a session cannot be used after a fork; fork before OpenGL is used, or start new processes ('spawn')"
         elif threading.get_ident() != self._thread:
-            text = "a session must be used by the thread that made it; make one a thread"
+            text = "a session must be used by the thread that created it; create one per thread"
         elif self.device.gone:
-            text = "the session's context has been released; keep it until the session is closed, or make another"
+            text = "the session's context has been released; keep it until the session is closed, or create another"
         if text:
             raise RenderError(Problem("RG615", text))
         with self.device.current():

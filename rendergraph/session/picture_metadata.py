@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rendergraph.session.values import Linked
 
 PICTURES = frozenset({".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga"})
-"""Extensions that make a name a picture's rather than a pipeline's."""
+"""Extensions of pictures, which distinguish them from pipelines."""
 _MOST_FRAMES = 10**9
 
 
@@ -78,7 +78,7 @@ def metadata(path: Path) -> dict[str, str]:
     record_read(path)
     found = read_metadata(path)
     if "pipeline" not in found:
-        text = "the picture does not say how it was made; EXR and PNG files that rendergraph wrote do"
+        text = "the picture has no pipeline in its metadata; EXR and PNG files written by rendergraph have one"
         raise InputError(Problem("RG510", text, Place(str(path))))
     return found
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import TypeAlias
 
 Progress: TypeAlias = Callable[[int, int], None]
-"""Told how many parts of the work are done, and of how many."""
+"""Receives how many parts of the work are done, and of how many."""
 
 _WIDTH = 30
 

@@ -1,4 +1,4 @@
-"""The scene of a pipeline; pipelines that ask for the same unchanged files share one, and so its place on the GPU."""
+"""The scene of a pipeline; pipelines with the same unchanged scene files share one, and so its place on the GPU."""
 
 from __future__ import annotations
 
@@ -24,11 +24,7 @@ _IN_USE: WeakValueDictionary[tuple[Any, ...], Scene] = WeakValueDictionary()
 
 
 def scene_of(resolved: Resolved) -> Scene:
-    """The scene, completed by a camera and a light where it has none.
-
-    Raises:
-        InputError: a file of it is missing or wrong.
-    """
+    """Return the scene, with at least a camera and a light."""
     selection, spec, extensions = resolved.selection, resolved.spec, resolved.catalog.extensions
     limits = scene_limits(selection)
     roots = spec.roots.folders if spec.scene is not None else ()
@@ -56,7 +52,7 @@ def scene_limits(selection: Selection) -> SceneLimits:
 
 
 def _environment(path: Path, scene: Scene, limits: SceneLimits, extensions: Extensions) -> Environment:
-    """What is named beside the scene, in place of its own."""
+    """Return the environment that the selection has in place of the scene's own."""
     found = named(str(path), scene.lights)
     if found is not None:
         return found
@@ -66,7 +62,7 @@ def _environment(path: Path, scene: Scene, limits: SceneLimits, extensions: Exte
 
 
 def _measured(scene: Scene, limits: SceneLimits) -> Scene:
-    """The scene with its environment's size, which only decoding tells of a plugin's files."""
+    """Return the scene with its environment's size, which only decoding finds out of a plugin's files."""
     environment = scene.environment
     if environment is None or environment.size is not None or not isinstance(environment.image, ImageSource):
         return scene

@@ -1,6 +1,6 @@
-"""What is asked for, before anything is read: which pipeline with what said about it, and how it is to be drawn.
+"""The arguments of a render before anything is read: a pipeline with the changes to it, and how to render it.
 
-Both are plain frozen values without GL, files or modules in them, so that a run can be sent to another process.
+Both are frozen values without GL, files or modules in them, so that a run can be sent to another process.
 """
 
 from __future__ import annotations
@@ -19,29 +19,26 @@ from rendergraph.errors import Problem, UsageError, suggestion
 TEXTURE_PART = (
     r"(?:\[(?!\])(?:(?P<layer>\d{1,9})(?:,(?=mip)|(?=\])))?(?:mip=(?P<mip>\d{1,9}))?\])?(?P<stencil>:stencil)?"
 )
-"""What may stand behind `node.port` in a tap: `[2]`, `[mip=3]`, `[2,mip=3]` and `:stencil`."""
+"""The suffixes of `node.port` in a tap: `[2]`, `[mip=3]`, `[2,mip=3]` and `:stencil`."""
 
 MOST_FRAMES = 100_000
-"""Of one run: an hour at 30 frames a second."""
+"""Per run: an hour at 30 frames per second."""
 
 
 class Selection(Struct, frozen=True):
-    """A pipeline's name with everything that changes it, as the options of every verb say it.
+    """A pipeline's name with everything that changes it, as the options of every verb have it.
 
     Attributes:
         source: a shipped name (`forward`) or a path.
         scene, size: override the file's; `size` is width and height in pixels.
         environment: an equirectangular image that replaces the scene's.
         camera: name of the scene's camera; its first by default.
-        sets: what `-s` takes, such as `ao.radius=0.8`.
+        sets: values of `-s`, such as `ao.radius=0.8`.
         patches: merge patches, as files or mappings.
-        asset_roots: more folders that the file may reach.
-        limits: what files may ask for, by the names that messages give: `yaml-depth`, `scene-vertices`, …;
-            `plan-memory`, in MiB, is what textures may take.
+        asset_roots: more folders from which files may be read.
+        limits: limits of files, by the names in messages: `yaml-depth`, `scene-vertices`, …; `plan-memory`, in MiB, is
+            that of all textures.
         plugins: Python files or folders with node types.
-
-    Raises:
-        UsageError: a limit of an unknown name, or a size that is no pair of whole numbers.
     """
 
     source: str
@@ -63,26 +60,26 @@ class Selection(Struct, frozen=True):
         known = {name for names in _limit_names().values() for name in names}
         for name, _ in self.limits:
             if name not in known:
-                raise UsageError(Problem("RG500", f"there is no limit '{name}'{suggestion(name, known)}"))
+                raise UsageError(Problem("RG500", f"unknown limit '{name}'{suggestion(name, known)}"))
 
     def allowed(self, kind: str) -> dict[str, int]:
-        """The limits set for `yaml` or `scene` files, or for the `plan`, by field."""
+        """Return the limits set for `yaml` or `scene` files, or for the `plan`, by field."""
         names = _limit_names()[kind] if self.limits else {}
         return {names[name]: most for name, most in self.limits if name in names}
 
 
 def _pair(size: Any) -> tuple[int, int]:
-    """Width and height; whether pictures can be so large is asked when the file is read."""
+    """Return width and height; the limit of pictures is checked when the file is read."""
     if isinstance(size, tuple | list) and len(size) == 2 and all(isinstance(each, Integral) for each in size):
         return int(size[0]), int(size[1])
     numbers = re.findall(r"\d+", size) if isinstance(size, str) else ()
     example = f"({', '.join(numbers)})" if len(numbers) == 2 else "(1280, 720)"
-    text = f"size is {size!r}; it is a pair, width and height in pixels, as in size={example}"
+    text = f"size: expected width and height in pixels, as in size={example}, got {size!r}"
     raise UsageError(Problem("RG500", text))
 
 
 def _limit_names() -> dict[str, dict[str, str]]:
-    """What each kind of file has limits of: the name on the command line to the field."""
+    """Return, for each kind of limits, the name on the command line to the field."""
     from rendergraph.document import YamlLimits
     from rendergraph.scene.model import SceneLimits
 
@@ -94,7 +91,7 @@ def _limit_names() -> dict[str, dict[str, str]]:
 
 
 class RenderKeywords(TypedDict, total=False):
-    """The fields of `RenderOptions` as keywords; names may be any sequence there, or the text of a single one."""
+    """The fields of `RenderOptions` as keywords; names may be any sequence, or the text of a single one."""
 
     frames: range
     fps: float
@@ -111,26 +108,22 @@ class RenderKeywords(TypedDict, total=False):
 
 
 class RenderOptions(Struct, frozen=True):
-    """What is drawn of a pipeline, and how; keywords of `render`, `frames` and `plan`.
+    """The outputs of a pipeline to render, and how; keywords of `render`, `frames` and `plan`.
 
     Attributes:
         frames: frame numbers from 1; frame 1 is time 0.
-        fps: frames a second.
-        outputs: names of the outputs to compute, all of the file's by default.
-        taps: further ports to read: `node.port`, of it `[layer]`, `[mip=1]` or `[layer,mip=1]`, and `:stencil`.
+        fps: frames per second.
+        outputs: names of the outputs to compute; all of the file's by default.
+        taps: further ports to read: `node.port`, followed by `[layer]`, `[mip=1]`, `[layer,mip=1]` or `:stencil`.
         alias, poison, shuffle: test modes: no sharing of memory, poisoned released textures, the seed of a random legal
-            order instead of the best one.
+            order.
         heap: let textures of any size and format share blocks of memory; the device must have memory objects.
-        warm_up: draw the first frame once more beforehand, unmeasured, and start history afresh after it. By default
-            that is done where steps are timed.
-        timed: measure each step, which takes longer than many small ones do.
-        reuse: leave out the steps whose values are still there from the frame before and would be the same; no bit of a
-            picture depends on it. By default that is done unless steps are timed, as those left out take no time.
-        cull: leave out objects that lie outside of the view that they would be drawn with; no bit of a picture depends
-            on it.
-
-    Raises:
-        UsageError: frames or frames a second that there cannot be.
+        warm_up: render the first frame once more beforehand, unmeasured, and clear the history after it; by default if
+            steps are timed.
+        timed: measure each step, which takes longer if there are many small ones.
+        reuse: skip steps whose results are unchanged since the previous frame; by default unless steps are timed, as
+            skipped steps take no time. No bit of a picture depends on it.
+        cull: skip objects outside the view that they would be rendered with. No bit of a picture depends on it.
     """
 
     frames: range = range(1, 2)
@@ -148,32 +141,34 @@ class RenderOptions(Struct, frozen=True):
 
     def __post_init__(self) -> None:
         if not isinstance(self.frames, range) or not self.frames or min(self.frames[0], self.frames[-1]) < 1:
-            text = f"frames is {self.frames!r}; it is a range of numbers from 1, as in range(1, 31) for the first 30"
+            text = (
+                f"frames: expected a range of numbers from 1, as in range(1, 31) for the first 30, got {self.frames!r}"
+            )
             raise UsageError(Problem("RG500", text))
         if len(self.frames) > MOST_FRAMES:
-            text = f"{len(self.frames)} frames are more than {MOST_FRAMES} at a time; draw them in parts"
+            text = f"{len(self.frames)} frames exceed the limit of {MOST_FRAMES} per run; render them in several runs"
             raise UsageError(Problem("RG500", text))
         if not self.fps > 0:
-            raise UsageError(Problem("RG500", f"fps is {self.fps}; it is a number above 0"))
+            raise UsageError(Problem("RG500", f"fps: expected a number above 0, got {self.fps}"))
 
     @property
     def warms_up(self) -> bool:
-        """Whether a frame is drawn before the first, so that what a driver does once is not measured."""
+        """Whether a frame is rendered before the first, so that one-time work of a driver is not measured."""
         return self.timed if self.warm_up is None else self.warm_up
 
     @property
     def reuses(self) -> bool:
-        """Whether steps are left out; what poison overwrites is never there."""
+        """Whether steps are skipped; poison overwrites the results that this needs."""
         return not self.poison and (not self.timed if self.reuse is None else self.reuse)
 
     @property
     def shares(self) -> bool:
-        """Whether kept values are taken over from other pipelines; the modes that check one make all of it."""
+        """Whether kept values of other pipelines are used; the test modes compute all of them."""
         return self.alias and not self.poison and self.shuffle is None
 
     @classmethod
     def of(cls, keywords: RenderKeywords) -> RenderOptions:
-        """The options that keywords spell; None is the default."""
+        """Return the options of these keywords; None is the default."""
         given: dict[str, Any] = {name: value for name, value in keywords.items() if value is not None}
         for name in {"outputs", "taps"} & given.keys():
             given[name] = each_of(given[name])
@@ -181,5 +176,5 @@ class RenderOptions(Struct, frozen=True):
 
 
 def each_of(names: Iterable[str]) -> tuple[str, ...]:
-    """Several names, or a text that is one: its letters are never meant."""
+    """Return several names as a tuple; a text is a single name, not its letters."""
     return (names,) if isinstance(names, str) else tuple(names)

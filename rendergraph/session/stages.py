@@ -52,9 +52,7 @@ def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
     """
     for folder in selection.asset_roots:
         if not folder.is_dir():
-            text = (
-                f"'{folder}' is a file; a folder is expected" if folder.exists() else f"there is no folder '{folder}'"
-            )
+            text = f"'{folder}' is a file; expected a folder" if folder.exists() else f"there is no folder '{folder}'"
             raise InputError(Problem("RG011", text, Place(Option("--asset-root"))))
     catalog = catalog or Catalog.discover(selection.plugins)
     limits = YamlLimits(**selection.allowed("yaml"))

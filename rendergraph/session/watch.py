@@ -20,11 +20,11 @@ from rendergraph.stamps import Stamps, modified, stamp, track_reads
 T = TypeVar("T")
 
 INTERVAL = 0.1
-"""Seconds between two looks."""
+"""Seconds between two checks."""
 REST = 0.05
-"""Seconds a file has to stay as it is before it is read: editors write in several moves."""
+"""Seconds for which a file must be unchanged before it is read: editors write in several steps."""
 PATIENCE = 1.0
-"""Seconds a file that has vanished, or does not come to rest, is waited for."""
+"""Seconds to wait for a file that has vanished or keeps changing."""
 
 
 @dataclass(frozen=True)

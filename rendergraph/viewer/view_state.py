@@ -185,7 +185,12 @@ class ViewState:
             case messages.CompareMessage(None):
                 self._other = None
             case messages.CompareMessage(str(name)):
-                self._compare_with(name, self._others.get(name) or self._shipped(name))
+                selection = self._others.get(name)
+                if selection is None and name not in shipped_pipelines():
+                    text = "compare with a shipped pipeline, a snapshot, or the pipeline of --against"
+                    raise UsageError(Problem("RG500", text))
+                shipped = structs.replace(self.opened, source=name, sets=(), patches=())
+                self._compare_with(name, selection or shipped)
         return True
 
     def _move(self, message: messages.CameraMessage) -> None:
@@ -198,12 +203,6 @@ class ViewState:
             if camera is not None and amounts is not None:
                 camera = move(camera, self._sphere, *amounts)
         self.camera = camera
-
-    def _shipped(self, name: str) -> Selection:
-        if name not in shipped_pipelines():
-            text = "compare with a shipped pipeline, a snapshot, or the pipeline of --against"
-            raise UsageError(Problem("RG500", text))
-        return structs.replace(self.opened, source=name, sets=(), patches=())
 
     def _compare_with(self, name: str, selection: Selection) -> None:
         """Add something to compare with, in place of the oldest where there are too many."""

@@ -135,8 +135,8 @@ def test_a_second_node_beside_the_first_leaves_the_schema_and_says_how_to_refres
     [
         ("Lens-Falloff", r"RG530 .* such as 'lens_falloff'"),
         ("3d", r"such as 'd'"),
-        ("", r"a name is up to 40"),
-        ("x" * 41, r"a name is up to 40"),
+        ("", r"expected up to 40"),
+        ("x" * 41, r"expected up to 40"),
         ("a__b", r"such as 'a_b'"),
         ("gl_thing", r"reserved by GLSL"),
         ("filter", r"reserved by GLSL or Python; choose another, such as 'my_filter'"),

@@ -350,7 +350,7 @@ def test_python_that_is_not_run_is_a_warning(write: Write, monkeypatch: pytest.M
     [
         ("[../fx]", "2:11: RG012 '../fx' lies outside"),
         ("[./none]", "2:11: RG011 there is no folder './none'"),
-        ("[./p.yaml]", "2:11: RG011 './p.yaml' is a file; a folder is expected"),
+        ("[./p.yaml]", "2:11: RG011 './p.yaml' is a file; expected a folder"),
         (
             "./fx",
             "2:10: RG106 'plugins': expected a list of folders and packages, as in plugins: [./effects, some-package], got './fx'",

@@ -95,14 +95,14 @@ def test_version(cli: Any) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["render", "forward"], "RG500 there is no verb 'render'; did you mean 'run'?; see 'rendergraph --help'"),
-        (["list"], "RG500 there is no verb 'list'; did you mean 'pipelines'?; see 'rendergraph --help'"),
-        (["forward"], "RG500 there is no verb 'forward'; did you mean 'run forward'?; see 'rendergraph --help'"),
-        (["my.yaml"], "RG500 there is no verb 'my.yaml'; did you mean 'run my.yaml'?; see 'rendergraph --help'"),
-        (["rum"], "RG500 there is no verb 'rum'; did you mean 'run'?; see 'rendergraph --help'"),
+        (["render", "forward"], "RG500 unknown verb 'render'; did you mean 'run'?; see 'rendergraph --help'"),
+        (["list"], "RG500 unknown verb 'list'; did you mean 'pipelines'?; see 'rendergraph --help'"),
+        (["forward"], "RG500 unknown verb 'forward'; did you mean 'run forward'?; see 'rendergraph --help'"),
+        (["my.yaml"], "RG500 unknown verb 'my.yaml'; did you mean 'run my.yaml'?; see 'rendergraph --help'"),
+        (["rum"], "RG500 unknown verb 'rum'; did you mean 'run'?; see 'rendergraph --help'"),
         (
             ["run", "x", "--siez", "1x1"],
-            "RG500 there is no option '--siez'; did you mean '--size'?; see",
+            "RG500 unknown option '--siez'; did you mean '--size'?; see",
         ),
         (["run", "x", "--size", "12"], "RG500 invalid value for '--size': '12' is not WIDTHxHEIGHT, as in 1280x720"),
         (["run", "x", "--size", "0x5"], "'0x5' is not WIDTHxHEIGHT"),
@@ -329,4 +329,4 @@ def test_no_command_line_ends_in_a_traceback(cli: Any, seed: int) -> None:
 def test_more_frames_than_anybody_waits_for_are_refused(cli: Any, frames: str) -> None:
     found = cli("run", "forward", "--frames", frames, "-o", "a.####.png", "--size", "8x8")
     assert found.code == 2
-    assert "frames are more than 100000 at a time; draw them in parts" in found.err
+    assert "frames exceed the limit of 100000 per run; render them in several runs" in found.err

@@ -108,7 +108,7 @@ def test_pictures_with_nan_are_told_and_never_win(cli: Any, tmp_path: Path) -> N
         (
             ("compare", "forward", "forward", "--fail-above", "flpi=1"),
             2,
-            "there is no metric 'flpi'; did you mean 'flip'?",
+            "unknown metric 'flpi'; did you mean 'flip'?",
         ),
         (("compare", "forward", "forward", "--fail-above", "psnr=30"), 2, "psnr falls as errors grow"),
         (("compare", "forward", "forward", "--fail-above", "flip=x"), 2, "is not METRIC=NUMBER, as in flip=0.02"),

@@ -100,7 +100,7 @@ def test_compare_shows_a_plugins_metric(cli: Any, plugin: Path, tmp_path: Path) 
     assert cli(*words, "--fail-above", "darker=0.99").code == 0
     unknown = cli(*words, "--fail-above", "drker=1")
     assert unknown.code == 2
-    assert "there is no metric 'drker'; did you mean 'darker'?" in unknown.err
+    assert "unknown metric 'drker'; did you mean 'darker'?" in unknown.err
 
 
 @pytest.mark.slow

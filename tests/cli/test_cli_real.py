@@ -204,9 +204,9 @@ def test_a_folder_that_cannot_be_is_said_before_drawing(cli: Any, tmp_path: Path
         (["check", "forward", "-p", "none.yaml"], "none.yaml"),
         (["plan", "none.yaml"], "RG011 there is no file 'none.yaml'"),
         (["graph", "forward", "-o", "no/a.svg"], "no/a.svg: RG504 cannot be written: there is no folder 'no'"),
-        (["nodes", "shadow"], "RG511 there is no family of nodes 'shadow'; did you mean 'shadows'?"),
-        (["explain", "RG1O3"], "RG511 nothing is called 'RG1O3'"),
-        (["explain", "RG999"], "RG511 there is no error code 'RG999'"),
+        (["nodes", "shadow"], "RG511 unknown family of nodes 'shadow'; did you mean 'shadows'?"),
+        (["explain", "RG1O3"], "RG511 unknown name 'RG1O3'"),
+        (["explain", "RG999"], "RG511 unknown error code 'RG999'"),
     ],
 )
 def test_what_is_missing_or_wrong_exits_3(cli: Any, tmp_path: Path, words: list[str], message: str) -> None:
@@ -378,7 +378,7 @@ def test_doctor_names_the_workarounds_for_a_driver(cli: Any, monkeypatch: pytest
     device = {"number": 0, "renderer": "zink", "version": "4.6 Mesa", "gl": "4.6", "software": True, "features": {}}
     device["workarounds"] = ["a crash of this driver is avoided"]
     monkeypatch.setattr(doctor, "_probe", lambda *number: device if number else {"devices": [{"number": 0}]})
-    assert "software: no measure of a GPU, a crash of this driver is avoided" in cli("doctor").out
+    assert "software: not comparable to a GPU, a crash of this driver is avoided" in cli("doctor").out
 
 
 def test_doctor_says_what_to_install(cli: Any, monkeypatch: pytest.MonkeyPatch) -> None:

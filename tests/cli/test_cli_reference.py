@@ -68,7 +68,7 @@ def test_shaders_are_hinted_at(cli: Any, tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.chdir(tmp_path)
     (tmp_path / "part.glsl").write_text("")
     (tmp_path / "film.frag").write_text("out vec4 made;\nvoid main() { made = vec4(1.0); }\n")
-    assert "RG511 nothing is called 'film'; did you mean './film.frag'?" in cli("explain", "film").err
+    assert "RG511 unknown name 'film'; did you mean './film.frag'?" in cli("explain", "film").err
     assert "RG400 there is no shader 'nothere.frag'; available: film.frag\n" in cli("explain", "./nothere.frag").err
     assert cli("explain", "./film.frag").out.startswith("./film.frag\n")
 
@@ -275,8 +275,12 @@ def test_a_step_of_several_and_a_variant_of_several(cli: Any, tmp_path: Path) ->
             3,
             "RG511 these options leave no node of type 'ssao_hemisphere'",
         ),
-        ("tonemap --step 1", 2, "RG500 --pipeline, --step and what changes a pipeline go with --glsl"),
-        ("tonemap -s display.exposure=1", 2, "RG500 --pipeline, --step and what changes a pipeline go with --glsl"),
+        ("tonemap --step 1", 2, "RG500 --pipeline, --step and options that change a pipeline require --glsl"),
+        (
+            "tonemap -s display.exposure=1",
+            2,
+            "RG500 --pipeline, --step and options that change a pipeline require --glsl",
+        ),
     ],
 )
 def test_programs_that_are_not_there(cli: Any, words: str, code: int, message: str) -> None:

@@ -17,7 +17,7 @@ def test_without_a_file_the_picture_is_named_after_the_pipeline(cli: Any, fake: 
     assert result.code == 0
     assert result.out == "where.png\n"
     assert "not drawn: idle: nobody reads it" in result.err
-    assert "6×4, 0 passes, drawn in 1.0 ms on none (software: no measure of a GPU)" in result.err
+    assert "6×4, 0 passes, drawn in 1.0 ms on none (software: not comparable to a GPU)" in result.err
     assert images.read("where.png").shape == (4, 6, 3)
     assert fake.calls["outputs"] == ("image",)
     assert fake.calls["frames"] == range(1, 2)
@@ -206,7 +206,7 @@ def test_no_picture_takes_the_place_of_a_texture_that_is_read(cli: Any, tmp_path
     ("words", "code", "message"),
     [
         (("run", "forward", "--asset-root", "none"), 3, "--asset-root: RG011 there is no folder 'none'"),
-        (("check", "forward", "--asset-root", "file"), 3, "--asset-root: RG011 'file' is a file; a folder is expected"),
+        (("check", "forward", "--asset-root", "file"), 3, "--asset-root: RG011 'file' is a file; expected a folder"),
         (("run", "forward", "--asset-root", ""), 2, "invalid value for '--asset-root': '' is not the name of a file"),
         (("run", "forward", "--plugin", ""), 2, "invalid value for '--plugin': '' is not the name of a file"),
         (

@@ -15,7 +15,7 @@ from rendergraph.cli.suggestions import MEANINGS, NEEDLESS
     [
         ("run forward --width 640", "did you mean '--size WxH'?"),
         ("run forward --height=480", "did you mean '--size WxH'?"),
-        ("run forward -width 640", "no option '-width'; did you mean '--size WxH'?"),
+        ("run forward -width 640", "unknown option '-width'; did you mean '--size WxH'?"),
         ("run forward --resolution 640x360", "did you mean '--size WxH'?"),
         ("run forward --open", "did you mean 'rendergraph view'?"),
         ("run forward --gui", "did you mean 'rendergraph view'?"),
@@ -49,7 +49,7 @@ from rendergraph.cli.suggestions import MEANINGS, NEEDLESS
         ("run forward --fraems 1-2", "did you mean '--frames'?"),
         ("run forward --env sky", "did you mean '--environment'?"),
         ("compare forward --refernce deferred", "did you mean '--reference'?"),
-        ("run forward --wobble", "there is no option '--wobble'; see 'rendergraph run --help'"),
+        ("run forward --wobble", "unknown option '--wobble'; see 'rendergraph run --help'"),
     ],
 )
 def test_an_unknown_option_is_answered_with_what_is_meant(cli: Any, typed: str, answer: str) -> None:

@@ -92,7 +92,7 @@ def test_software_times_say_so_wherever_they_stand(comparison: Comparison) -> No
     soft = comparison_page(replace(comparison, device={"renderer": "x", "software": True}), "c")
     for identity in ("summary", "times"):
         part = soft.partition(f'<section id="{identity}"')[2].partition("</section>")[0]
-        assert "software rasteriser: no measure of a GPU" in part, identity
+        assert "software rasteriser: not comparable to a GPU" in part, identity
     hard = comparison_page(replace(comparison, device={"renderer": "x", "software": False}), "c")
     assert "rasteriser" not in hard
 

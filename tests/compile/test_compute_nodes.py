@@ -66,7 +66,8 @@ def test_a_buffer_is_no_picture_on_the_command_line(
     assert main(["run", "test.yaml", "--plugin", "plugins", "--tap", f"count.counts=counts.{ending}"]) == 3
     said = capsys.readouterr().err
     assert (
-        "RG508 'count.counts' is a buffer, which no picture file holds; from Python it is frame['count.counts']" in said
+        "RG508 'count.counts' is a buffer, which picture files cannot store; read it in Python as frame['count.counts']"
+        in said
     )
 
 

@@ -114,9 +114,9 @@ def test_what_a_notebook_gives_is_understood_or_refused_in_words(gl: rg.Session)
         np.testing.assert_array_equal(gl.render(source, (8, 8))["image"], gl.render(pipeline)["image"])
     assert gl.render(pipeline, size=(4, 4)).size == (4, 4)
     for frames in (5, range(0), range(3)):
-        with pytest.raises(UsageError, match="it is a range of numbers from 1"):
+        with pytest.raises(UsageError, match="expected a range of numbers from 1"):
             gl.render(pipeline, frames=frames)  # type: ignore[arg-type]  # a mistake
-    with pytest.raises(UsageError, match="fps is 0; it is a number above 0"):
+    with pytest.raises(UsageError, match="fps: expected a number above 0, got 0"):
         gl.render(pipeline, fps=0)
 
 
@@ -143,7 +143,12 @@ def test_values_of_python_are_told_in_a_line(gl: rg.Session) -> None:
 
 @pytest.mark.parametrize(
     ("size", "means"),
-    [("320x180", r"size=\(320, 180\)"), (320, "a pair"), ((320.5, 180), "a pair"), ((1, 2, 3), "a pair")],
+    [
+        ("320x180", r"size=\(320, 180\)"),
+        (320, "expected width and height"),
+        ((320.5, 180), "expected width and height"),
+        ((1, 2, 3), "expected width and height"),
+    ],
 )
 def test_a_size_that_is_no_pair_is_told_what_one_is(size: Any, means: str) -> None:
     pipeline = rg.load("forward")
@@ -167,7 +172,7 @@ def test_who_asks_is_told_how_far_it_is(gl: rg.Session, capsys: pytest.CaptureFi
 def test_a_closed_session_says_so_and_may_be_closed_again() -> None:
     with rg.Session() as session:
         session.close()
-        with pytest.raises(RenderError, match="RG615 the session is closed; draw before"):
+        with pytest.raises(RenderError, match="RG615 the session is closed; render before"):
             session.render(rg.load("forward", size=(8, 8)))
 
 
@@ -183,7 +188,7 @@ def test_another_thread_may_not_close_a_session() -> None:
         thread = threading.Thread(target=close)
         thread.start()
         thread.join()
-        assert said == ["RG615 a session must be closed by the thread that made it; draw and close it there"]
+        assert said == ["RG615 a session must be closed by the thread that created it; render and close it there"]
         assert session.render("shading-unlit", (8, 8))["image"].any()
 
 
@@ -221,7 +226,7 @@ with rg.Session() as session:
 def test_a_forked_process_is_told_that_it_cannot_draw() -> None:
     done = subprocess.run([sys.executable, "-c", FORKED], capture_output=True, text=True, check=False, timeout=120)
     assert done.stdout.splitlines() == [
-        "RG615 a session stays in its process; fork before OpenGL is used, or start processes anew ('spawn')",
+        "RG615 a session cannot be used after a fork; fork before OpenGL is used, or start new processes ('spawn')",
         "RG611 OpenGL was used before this process was forked, and drivers do not survive a fork; "
         "start new processes instead, as multiprocessing does with 'spawn'",
         "parent draws",
@@ -304,7 +309,7 @@ def test_limits_are_raised_by_the_name_that_the_message_gives(tmp_path: Any) -> 
     assert "yaml-depth" not in str(caught.value)
     with pytest.raises(InputError, match="--limit scene-vertices=N"):
         rg.load("forward", limits={"scene-vertices": 10}, scene=_triangle(tmp_path)).check()
-    with pytest.raises(UsageError, match="there is no limit 'scene-vertexes'; did you mean 'scene-vertices'"):
+    with pytest.raises(UsageError, match="unknown limit 'scene-vertexes'; did you mean 'scene-vertices'"):
         rg.load("forward", limits={"scene-vertexes": 10})
 
 

@@ -128,12 +128,12 @@ def test_keywords_become_options() -> None:
 
 @pytest.mark.parametrize("frames", [range(0), range(0, 3), [1, 2]])
 def test_frames_are_a_range_from_1(frames: Any) -> None:
-    with pytest.raises(UsageError, match="it is a range of numbers from 1"):
+    with pytest.raises(UsageError, match="expected a range of numbers from 1"):
         RenderOptions(frames)
 
 
 def test_a_limit_of_no_name_is_said_at_once() -> None:
-    with pytest.raises(UsageError, match="there is no limit 'yaml-dept'; did you mean 'yaml-depth'"):
+    with pytest.raises(UsageError, match="unknown limit 'yaml-dept'; did you mean 'yaml-depth'"):
         Selection("forward", limits=(("yaml-dept", 3),))
 
 
@@ -171,7 +171,7 @@ def test_what_is_overtaken_says_so_and_what_is_left_harms_nobody(gl: rg.Session)
     first = next(frames)
     again = gl.render(pipeline)
     np.testing.assert_array_equal(first["image"], again["image"])
-    with pytest.raises(RenderError, match="RG615 the session has begun to draw something else"):
+    with pytest.raises(RenderError, match="RG615 the session has started another drawing"):
         next(frames)
     next(gl.frames(pipeline, frames=range(1, 4)))  # nobody asks for the rest
     np.testing.assert_array_equal(gl.render(pipeline)["image"], again["image"])

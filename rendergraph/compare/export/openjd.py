@@ -37,12 +37,16 @@ def template(
     if len(groups) > most_tasks:
         text = f"the sweep has {len(groups)} groups of runs, more than the {most_tasks} of a template; split the sweep"
         raise InputError(Problem("RG524", text))
+    parameters = _parameters(sweep, folder)
     steps = [_step("Measure", [{"name": "Runs", "type": "STRING", "range": groups}], _MEASURE)]
     if frames is not None:
         chunks = {"defaultTaskCount": "{{Param.Chunk}}", "rangeConstraint": "CONTIGUOUS"}
         run = {"name": "Run", "type": "INT", "range": f"1-{len(listing.prepared.runs)}"}
         frame = {"name": "Frame", "type": "CHUNK[INT]", "range": "{{Param.Frames}}", "chunks": chunks}
         steps.append(_step("Frames", [run, frame], _FRAMES))
+        first_last = f"{frames[0]}-{frames[-1]}"
+        parameters.append(_parameter("Frames", "STRING", "The frames to render of each run.", default=first_last))
+        parameters.append(_parameter("Chunk", "INT", "Frames per task.", minValue=1, default=chunk))
     after = [{"dependsOn": step["name"]} for step in steps]
     report = {"name": "Report", "dependencies": after, **_NEEDS, "script": _script(_REPORT)}
     name = listing.prepared.study["pipeline"]
@@ -52,12 +56,12 @@ def template(
         "extensions": ["FEATURE_BUNDLE_1", *(["TASK_CHUNKING"] if frames is not None else [])],
         "name": f"Sweep of {re.sub(r'[^ -~]|[{}]', '_', name)[:100]}",
         "description": f"{runs} runs, in groups that share passes; by rendergraph farm export.",
-        "parameterDefinitions": _parameters(sweep, folder, frames, chunk),
+        "parameterDefinitions": parameters,
         "steps": [*steps, report],
     }
 
 
-def _parameters(sweep: Path, folder: Path, frames: range | None, chunk: int) -> list[dict[str, Any]]:
+def _parameters(sweep: Path, folder: Path) -> list[dict[str, Any]]:
     beneath = sweep.resolve().is_relative_to(folder.resolve())
     where = sweep.resolve().relative_to(folder.resolve()) if beneath else None
     file, files = ({"default": where.as_posix()}, {"default": where.parent.as_posix()}) if where else ({}, {})
@@ -76,14 +80,6 @@ def _parameters(sweep: Path, folder: Path, frames: range | None, chunk: int) -> 
         ),
         _parameter("GPUs", "INT", "GPUs that a worker needs; 0 for a rasteriser on the CPU.", minValue=0, default=1),
         _parameter("Rendergraph", "STRING", "The program, as workers call it.", default="rendergraph"),
-        *([] if frames is None else _frame_parameters(frames, chunk)),
-    ]
-
-
-def _frame_parameters(frames: range, chunk: int) -> list[dict[str, Any]]:
-    return [
-        _parameter("Frames", "STRING", "The frames to render of each run.", default=f"{frames[0]}-{frames[-1]}"),
-        _parameter("Chunk", "INT", "Frames per task.", minValue=1, default=chunk),
     ]
 
 

@@ -11,7 +11,6 @@ from typing import Any, Literal
 
 from rendergraph.compare.engine import Sweep
 from rendergraph.compare.results import Result, pareto, typed_settings
-from rendergraph.compare.store import Failure
 
 
 @dataclass(frozen=True)
@@ -65,8 +64,14 @@ def csv_text(sweep: Sweep) -> str:
     """Return the table with a row for each run, under names; unknown values are empty, lists are JSON."""
     results = sweep.comparison.results
     front = {result.name for result in pareto(results)}
-    rows = [_row(result, result.name in front) for result in results]
-    rows += [_failed_row(failure) for failure in sweep.failures]
+    rows = []
+    for result in results:
+        row = {column.name: column.value(result) for column in COLUMNS}
+        row |= {PARETO.name: result.name in front, ERROR.name: None, **_prefixed("figures", result.columns)}
+        rows.append({RUN.name: result.name, **_prefixed("settings", typed_settings(result.settings)), **row})
+    for failure in sweep.failures:
+        settings = _prefixed("settings", typed_settings(failure.settings))
+        rows.append({RUN.name: failure.name, **settings, PARETO.name: False, ERROR.name: failure.text})
     names = list(dict.fromkeys(name for row in rows for name in row))
     text = io.StringIO()
     writer = csv.DictWriter(text, names, lineterminator="\n")
@@ -93,17 +98,6 @@ def csv_schema() -> dict[str, Any]:
             ERROR.field(),
         ],
     }
-
-
-def _row(result: Result, best: bool) -> dict[str, Any]:
-    row = {RUN.name: result.name, **_prefixed("settings", typed_settings(result.settings))}
-    row |= {column.name: column.value(result) for column in COLUMNS}
-    return row | {PARETO.name: best, ERROR.name: None} | _prefixed("figures", result.columns)
-
-
-def _failed_row(failure: Failure) -> dict[str, Any]:
-    settings = _prefixed("settings", typed_settings(failure.settings))
-    return {RUN.name: failure.name, **settings, PARETO.name: False, ERROR.name: failure.text}
 
 
 def _prefixed(kind: str, values: Mapping[str, Any]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from rendergraph.compare.timing import Spread
 from rendergraph.images import picture_bytes, viewable
 from rendergraph.metrics import Encoding, Pixels
 
-SOFTWARE = "software rasteriser: no measure of a GPU"
+SOFTWARE = "software rasteriser: not comparable to a GPU"
 
 
 def software_note(software: bool) -> str:
