@@ -45,13 +45,18 @@ def schema(catalog: Catalog, bases: Mapping[str, Mapping[str, str]] = {}) -> Sch
     """
     types: dict[str, type[Node] | None] = dict.fromkeys(catalog.names())
     types |= {found.name: found.cls for found in catalog.usable()[0]}
-    rules = {name: _rules_of(name, cls, catalog.extensions) for name, cls in types.items() if cls is not None}
+    rules: dict[str, Schema] = {
+        name: {"properties": {"inputs": _inputs(name, cls), "params": _params(name, cls, catalog.extensions)}}
+        for name, cls in types.items()
+        if cls is not None
+    }
     found = file_schema(PIPELINE)
     found["properties"]["nodes"]["additionalProperties"] = {"$ref": "#/definitions/node"}
     found["definitions"] = {"node": _node(types, rules)}
     for base, nodes in bases.items():
         known = {id: {"$ref": f"#/definitions/inherited_{name}"} for id, name in nodes.items() if name in rules}
-        found["definitions"] |= {f"inherited_{name}": _inherited(rules[name]) for name in {*nodes.values()} & {*rules}}
+        for name in {*nodes.values()} & {*rules}:  # of this type as long as nothing else is said
+            found["definitions"][f"inherited_{name}"] = {"if": {"not": {"required": ["type"]}}, "then": rules[name]}
         condition = {"properties": {"extends": {"const": base}}, "required": ["extends"]}
         then = {"properties": {"nodes": {"properties": known}}}
         found.setdefault("allOf", []).append({"if": condition, "then": then})
@@ -94,25 +99,13 @@ def _node(types: Mapping[str, type[Node] | None], rules: Mapping[str, Schema]) -
     return found
 
 
-def _inherited(then: Schema) -> Schema:
-    """A node of the file that is extended: of a type as long as nothing else is said."""
-    return {"if": {"not": {"required": ["type"]}}, "then": then}
-
-
-def _rules_of(type_name: str, cls: type[Node], extensions: Extensions) -> Schema:
-    return {"properties": {"inputs": _inputs(type_name, cls), "params": _params(type_name, cls, extensions)}}
-
-
 def _about(cls: type[Node]) -> str:
     """Its docs, and what others can connect to; lines of a paragraph are joined."""
     doc = re.sub(r"(?<!\n)\n(?![\n ])", " ", inspect.getdoc(cls) or "")
-    made = "\n".join(f"- `{name}`: {port.doc} ({_made(port)})" for name, port in cls.outputs().items())
-    return f"{doc}\n\nOutputs:\n\n{made}"
-
-
-def _made(port: Port) -> str:
-    like = getattr(port, "like", None)
-    return f"like `{like}`" if like else port_type(port)
+    likes = {name: getattr(port, "like", None) for name, port in cls.outputs().items()}
+    words = {name: f"like `{like}`" if like else _port_type(cls.outputs()[name]) for name, like in likes.items()}
+    outputs = "\n".join(f"- `{name}`: {port.doc} ({words[name]})" for name, port in cls.outputs().items())
+    return f"{doc}\n\nOutputs:\n\n{outputs}"
 
 
 def _inputs(type_name: str, cls: type[Node]) -> Schema:
@@ -129,13 +122,13 @@ def _known_names(properties: Schema, message: str) -> Schema:
 
 
 def _link(port: Input | InOut) -> Schema:
-    found = {**_LINK, "description": f"{port.doc} ({port_type(port)})"}
+    found = {**_LINK, "description": f"{port.doc} ({_port_type(port)})"}
     if isinstance(port, Input) and port.many:
         found |= {"type": ["string", "null", "array"], "items": {"type": "string"}}
     return found
 
 
-def port_type(port: Port) -> str:
+def _port_type(port: Port) -> str:
     """What a port carries, in a few words: `radiance`, `shadow(), many`, `depth, buffer`."""
     if isinstance(port, Function):
         return f"{port.signature.name}()"
@@ -168,14 +161,8 @@ def _param(parameter: Parameter, extensions: Extensions) -> Schema:
     kind = own.get("type")
     if kind in _WORDS:  # without alternatives, so that editors name the limit that is violated
         message = f"expected {_WORDS[kind]}, or $name for a parameter of the pipeline"
-        return {
-            **common,
-            **own,
-            **limits,
-            "type": [kind, "string", "null"],
-            "pattern": _REFERENCE["pattern"],
-            "patternErrorMessage": message,
-        }
+        found = {"type": [kind, "string", "null"], "pattern": _REFERENCE["pattern"], "patternErrorMessage": message}
+        return {**common, **own, **limits, **found}
     alternatives = own.get("anyOf", [own])  # limits beside alternatives hold for those that are numbers
     alternatives = [{**p, **limits} if p.get("type") in ("number", "integer") else p for p in alternatives]
     return {**common, "anyOf": [*alternatives, {"type": "null"}, _REFERENCE]}
@@ -219,16 +206,15 @@ def outdated(pipeline: Path, roots: Roots, catalog: Catalog, plugins: Iterable[P
         return None
     rest = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
     words = [word for plugin in plugins for word in ("--plugin", str(plugin))]
-    if _bases_in(written) - {*shipped_pipelines()}:  # it was written for a file that extends another
+    bases = {entry["if"]["properties"]["extends"]["const"] for entry in written.get("allOf", ())}
+    if bases - {*shipped_pipelines()}:  # it was written for a file that extends another
         words.append(shown_file(pipeline))
-    way_out = (
-        f"`{shlex.join(['rendergraph', 'schema', *words, '-o', shown_file(os.path.normpath(file))])}` writes it anew"
-    )
+    command = shlex.join(["rendergraph", "schema", *words, "-o", shown_file(os.path.normpath(file))])
+    way_out = f"`{command}` writes it again"
     # The plugins of those are not known here; a shader file comes with the pipeline that names it.
     if gone := [f"'{name}'" for name in then if name not in now and "/" not in name]:
-        way_out += (
-            f", with --plugin for {', '.join(gone[:3])}{f' and {len(gone) - 3} more' if len(gone) > 3 else ''} too"
-        )
+        more = f" and {len(gone) - 3} more" if len(gone) > 3 else ""
+        way_out += f", with --plugin for {', '.join(gone[:3])}{more} too"
     line = text.count("\n", 0, found.start()) + 1
     return Problem(
         "RG153",
@@ -244,8 +230,3 @@ def _rules(found: Any) -> dict[str, Any]:
     rules = {entry["if"]["properties"]["type"]["const"]: entry["then"] for entry in node["allOf"]}
     about = {entry["const"]: entry for entry in node["properties"]["type"]["anyOf"] if "const" in entry}
     return {name: [rules.get(name), entry] for name, entry in about.items()}
-
-
-def _bases_in(found: Any) -> set[str]:
-    """The files that a schema has bases for."""
-    return {entry["if"]["properties"]["extends"]["const"] for entry in found.get("allOf", ())}

@@ -142,7 +142,7 @@ def test_check_says_when_the_schema_beside_the_file_is_out_of_date(
     assert warned() == ""  # a schema may be for more plugins than this run has
     schema_file = tmp_path / "rendergraph.schema.json"
     schema_file.write_text(schema_file.read_text().replace("tonemap", "tone"))
-    assert warned().endswith("writes it anew, with --plugin for 'fog', 'tone' too")
+    assert warned().endswith("writes it again, with --plugin for 'fog', 'tone' too")
 
 
 def test_a_schema_of_a_file_is_written_anew_for_that_file(
@@ -162,7 +162,7 @@ def test_a_schema_of_a_file_is_written_anew_for_that_file(
     (tmp_path / "mine.json").write_text((tmp_path / "mine.json").read_text().replace("tonemap", "tone"))
     capsys.readouterr()
     main(["check", "mine.yaml"])
-    assert "`rendergraph schema mine.yaml -o mine.json` writes it anew, with --plugin for 'tone' too" in (
+    assert "`rendergraph schema mine.yaml -o mine.json` writes it again, with --plugin for 'tone' too" in (
         capsys.readouterr().err
     )
 

@@ -334,7 +334,7 @@ def _reasons(plan: ResourcePlan) -> dict[str, str]:
         if resource.role == "history" and len(placement[id]) == 2:
             reasons[id] = f"the next frame reads it: two {word}s take turns and nothing shares them"
         elif resource.role == "history":
-            reasons[id] = f"the next frame reads it, before it is written anew: one {word}, and nothing shares it"
+            reasons[id] = f"the next frame reads it, before it is written again: one {word}, and nothing shares it"
         elif resource.role == "scene":
             reasons[id] = "it is uploaded with the scene, and all pipelines that draw that read it"
         elif resource.role == "kept":

@@ -140,7 +140,7 @@ def test_history_that_is_read_before_it_is_written_has_one_texture() -> None:
     assert len(plan.placement["n2.x"]) == 1
     assert plan.lifetimes["n2.x"].first == 0
     assert plan.physicals[plan.placement["n2.x"][0]].members == ("n2.x",)
-    assert "before it is written anew: one texture" in plan.reasons["n2.x"]
+    assert "before it is written again: one texture" in plan.reasons["n2.x"]
     assert all("n2.x" not in ids for ids in plan.released.values())
     assert plan.memory.allocated_bytes == 3 * UNIT
     assert len(allocate(plan.schedule, alias=False).placement["n2.x"]) == 2
