@@ -412,6 +412,3 @@ def _median(values: Sequence[float]) -> float:
     """NumPy's imports masked arrays first, `statistics` exact fractions: both take longer than a frame."""
     ranked = sorted(values)
     return float(ranked[len(ranked) // 2] + ranked[(len(ranked) - 1) // 2]) / 2
-
-
-__all__ = ["FrameContext", "FrameTimes", "Runner", "StepTime", "median_times", "summary"]

@@ -82,12 +82,10 @@ def packages() -> dict[str, Package]:
 
 
 def version(name: str) -> str | None:
-    """Return the version of a package; None where it is not installed."""
     return versions([name])[name]
 
 
 def versions(names: Iterable[str]) -> dict[str, str | None]:
-    """Return the versions of packages by their names; None for those that are not installed."""
     known = packages()
     found = {name: known.get(plain(name)) for name in names}
     return {name: package.version if package is not None else None for name, package in found.items()}

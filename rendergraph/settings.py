@@ -176,7 +176,6 @@ class Roots(Struct, frozen=True):
 
 
 def expand_home(text: str) -> Path:
-    """Replace `~` by the user's home, if there is one."""
     path = Path(text)
     try:
         return path.expanduser()

@@ -258,7 +258,6 @@ def _blocks(
     classes: Kinds,
     by_desc: Groups,
 ) -> Groups:
-    """Return textures in blocks of memory, and buffers unchanged."""
     textures = [id for id in ids if not isinstance(classes[id], BufferDesc)]
     items = tuple([HeapItem(sizes[id], lifetimes[id].first, lifetimes[id].last, classes[id]) for id in textures])
     buffers = [group for group in by_desc if isinstance(classes[group[0]], BufferDesc)]

@@ -62,7 +62,6 @@ def least_bytes(items: Sequence[HeapItem]) -> int:
 
 
 def _placed(items: Sequence[HeapItem], alive: Sequence[int], order: Sequence[int]) -> tuple[list[list[int]], int]:
-    """Return the blocks of items placed in that order, and their bytes."""
     blocks: list[list[int]] = []
     sizes: list[int] = []
     taken: list[int] = []  # of each block the positions at which one of its items is alive

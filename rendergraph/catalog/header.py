@@ -47,7 +47,6 @@ def is_in(text: str) -> bool:
 
 
 def read_header(text: str, file: Path, name: str) -> Header:
-    """Return the header of a shader's text; an error if it has no end or is not YAML."""
     begin = _BEGIN.search(text)
     lines = text.split("\n")
     if begin is None:

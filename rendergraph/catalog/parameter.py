@@ -18,15 +18,12 @@ Report = Callable[[str, str, "Value | None"], None]
 
 
 def uniform_names(declared: Iterable[Global]) -> list[str]:
-    """Return the uniforms that may be parameters."""
     return [
         one.name for one in declared if one.storage == "uniform" and (one.type in _SCALAR or _VECTOR.match(one.type))
     ]
 
 
 class ParameterReader:
-    """Makes one parameter."""
-
     def __init__(
         self, name: str, entry: Mapping[str, Value], named: Value | None, found: Global | None, report: Report
     ) -> None:

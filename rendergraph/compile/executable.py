@@ -97,7 +97,6 @@ class CompiledStep(Struct, eq=False):
 
     @property
     def all_draws(self) -> list[Draw]:
-        """All draws, however they are ordered."""
         return self.draws + (self.sorted.parts if self.sorted is not None else [])
 
     def values(self, step: Step) -> dict[str, Any]:

@@ -66,7 +66,6 @@ class GeometryCompiler(Struct, eq=False):
     buffers: list[moderngl.Buffer] = field(default_factory=list)
 
     def draws(self, step: Step, make: Callable[[MultiDraw], Draw]) -> list[Draw] | SortedDraws:
-        """The draws of a step."""
         objects = select(self.scene.scene, step)
         if not objects:
             return []

@@ -18,7 +18,6 @@ from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.views import FIXED_BLOCKS
 from rendergraph.gl import textures
 from rendergraph.gl.device import Device
-from rendergraph.gl.mips import fill_mips
 from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import GpuTexture
 from rendergraph.program.variants import light_macros, scene_macros, storage_blocks
@@ -60,8 +59,6 @@ _PADDING = {"4f": "16x", "2i": "8x"}
 
 
 class MeshIndices(Struct, frozen=True, eq=False):
-    """The indices of all meshes, for one kind of primitive."""
-
     buffer: moderngl.Buffer
     commands: Records
     mode: int
@@ -105,7 +102,6 @@ class GpuScene(Struct, eq=False, dict=True):
 
     @property
     def light_defines(self) -> dict[str, str]:
-        """Macros about the lights, for every shader."""
         return light_macros(self.scene, self._stored)
 
     @property
@@ -236,7 +232,7 @@ class GpuScene(Struct, eq=False, dict=True):
         if pixels.dtype == np.uint8:
             self.device.raw.glGenerateTextureMipmap(made.glo)
         else:
-            fill_mips(self.device, made)
+            textures.fill_mips(self.device, made)
         return made
 
     def release(self, programs: ProgramCache) -> None:

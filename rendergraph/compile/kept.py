@@ -93,7 +93,7 @@ class KeptValues(Struct, eq=False):
 def contents(executable: Executable) -> Mapping[str, Content]:
     """Of each kept resource all that it is made of: steps with their parameters and texts, and the environment.
 
-    They look at nothing else: what a kept value may not depend on, `check_kept` and `check_kept_text` refuse.
+    They look at nothing else: what a kept value may not depend on, `expand` and `check_kept_text` refuse.
     """
     resources = executable.plan.resources
     steps = {

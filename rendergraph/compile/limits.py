@@ -74,7 +74,6 @@ def _excesses(
 
 
 def groups_of(step: Step, local: tuple[int, int, int], limits: Mapping[str, int]) -> tuple[int, int, int]:
-    """How many work groups a compute step has."""
     groups = step.groups
     assert isinstance(groups, tuple)
     if step.invocations is not None:

@@ -36,7 +36,6 @@ class ProgramCache(Struct, eq=False):
         return len(self._programs)
 
     def get(self, texts: Mapping[str, StageText], blocks: Mapping[str, int], outputs: Sequence[str]) -> Program:
-        """The program of these texts."""
         sources = {stage: text.text for stage, text in texts.items()}
         key = (*sources.items(), tuple(outputs), tuple(sorted(blocks.items())))
         if key in self._programs:

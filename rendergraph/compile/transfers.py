@@ -17,7 +17,6 @@ _R8UI, _RED_INTEGER, _UNSIGNED_BYTE, _READ_WRITE = 0x8232, 0x8D94, 0x1401, 0x88B
 
 
 def transfer_calls(device: Device, memory: Memory, step: Step, parity: int) -> list[Call]:
-    """The calls of a clear, a mip chain, a resolve or a copy."""
     if step.kind == "copy":
         return _copy(device, memory, step, parity)
     if step.kind == "resolve":

@@ -55,7 +55,6 @@ class ViewBuffers(Struct, eq=False, dict=True):
         return len(FIXED_BLOCKS) + list(self.tables).index(table)
 
     def previous_binding(self, table: str) -> int:
-        """The binding point of the views that a table had in the frame before."""
         return len(FIXED_BLOCKS) + len(self.tables) + [CAMERA, *self.tables].index(table)
 
     @property

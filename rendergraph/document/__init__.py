@@ -35,7 +35,6 @@ def load(path: Path, *, limits: YamlLimits = YamlLimits(), keep_going: bool = Fa
 
 
 def read_text(path: Path, limits: YamlLimits, name: str) -> str:
-    """Return the text of a file; `name` is how messages name it."""
     raw = read_bytes(path, limits.bytes, name)
     try:
         return raw.decode("utf-8-sig")

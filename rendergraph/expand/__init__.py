@@ -6,17 +6,23 @@ anybody reads; then versions are counted from the beginning to the end.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
-from rendergraph.expand.finalize import check_kept, finalize_resources
+from msgspec.structs import replace
+
+from rendergraph.declare import WrittenPort
+from rendergraph.errors import InputError, Problem
 from rendergraph.expand.model import CAMERA as CAMERA
 from rendergraph.expand.model import Expansion as Expansion
+from rendergraph.expand.model import VersionedSteps, follow_forwards
 from rendergraph.expand.model import ViewTable as ViewTable
 from rendergraph.expand.recording import define_parameters as define_parameters
 from rendergraph.expand.recording import param_uniforms as param_uniforms
 from rendergraph.expand.recording import record_all
 from rendergraph.expand.versions import assign_versions
 from rendergraph.link import Endpoint, Graph
+from rendergraph.steps import Read, Resource, Role, Step, Write
+from rendergraph.textures import BufferDesc
 
 
 def expand(graph: Graph, wanted: Mapping[str, Endpoint] | None = None) -> Expansion:
@@ -25,6 +31,90 @@ def expand(graph: Graph, wanted: Mapping[str, Endpoint] | None = None) -> Expans
     order = graph.reading_order()
     recorded, idle = record_all(graph, order, outputs)
     idle |= dict.fromkeys(graph.unlit, "the scene has no environment")
-    expansion = finalize_resources(graph, assign_versions(graph, recorded, idle), outputs)
-    check_kept(expansion.steps, expansion.resources)
+    expansion = _finalize(graph, assign_versions(graph, recorded, idle), outputs)
+    _check_kept(expansion.steps, expansion.resources)
     return expansion
+
+
+def _finalize(graph: Graph, found: VersionedSteps, wanted: Mapping[str, Endpoint]) -> Expansion:
+    """Check that every output is written, copy versions that a later node overwrites, and assign final roles."""
+    steps, resources = list(found.steps), dict(found.resources)
+    shown: dict[str, str] = {}
+    for name, port in wanted.items():
+        end = follow_forwards(found.forwarded, port)
+        if end not in found.final or end.node in found.idle:
+            reason = found.idle.get(end.node, "it makes no texture")
+            text = f"output '{name}' shows '{end}', but that is never rendered: {reason}"
+            raise InputError(Problem("RG204", text, graph[end.node].place, subject=str(end)))
+        resource, version = found.final[end]
+        shown[name] = resource
+        if version == found.newest[resource]:
+            continue
+        shown[name] = f"{end} kept"  # what a tap in the middle of a chain shows is copied
+        if shown[name] not in resources:
+            resources[shown[name]] = replace(resources[resource], id=shown[name], role="output")
+            steps.append(_copy(name, end, resource, version, steps))
+    _mark_roles(graph, found, shown, steps, resources)
+    ports = {end: resource for end, (resource, _) in found.final.items()}
+    return Expansion(tuple(steps), resources, shown, found.idle, found.views, ports)
+
+
+def _copy(name: str, end: Endpoint, resource: str, version: int, steps: list[Step]) -> Step:
+    index = 1 + max(step.index for step in steps if step.node == end.node)
+    read, write = Read("source", resource, version, "image"), Write("copy", f"{end} kept", 1, "image")
+    label = f"copy of {end}, kept for {'tap' if '.' in name else 'output'} '{name}'"
+    return Step(end.node, index, "copy", reads=(read,), writes=(write,), label=label)
+
+
+def _mark_roles(
+    graph: Graph, found: VersionedSteps, shown: Mapping[str, str], steps: list[Step], resources: dict[str, Resource]
+) -> None:
+    """Outputs, and resources that outlive the frame, are never shared."""
+    previous = {read.resource for step in steps for read in step.all_reads if read.previous}
+    for end in graph.textures:
+        if str(end) in previous and str(end) not in resources:  # its node is idle: it stays as it first was
+            port, info = graph[end.node].node.ports()[end.port], graph.textures[end]
+            assert isinstance(port, WrittenPort)
+            desc, first = info.desc or BufferDesc(info.bytes), port.first or 0.0
+            resources[str(end)] = Resource(str(end), desc, "history", first, info.view, info.lights)
+    for name in set(shown.values()) | previous:
+        resource = resources[name]
+        role: Role = "history" if name in previous else "output"
+        role = resource.role if resource.role in ("history", "kept") else role
+        resources[name] = replace(resource, role=role, first=found.firsts.get(name, resource.first))
+
+
+def _check_kept(steps: Sequence[Step], resources: Mapping[str, Resource]) -> None:
+    """Check that steps which write kept resources depend on nothing that changes from frame to frame (RG439).
+
+    What their shaders read besides is checked where program text is assembled.
+    """
+    problems = [
+        step.problem("RG439", text)
+        for step in steps
+        for made in [[write.resource for write in step.writes if resources[write.resource].role == "kept"]]
+        if made
+        for text in _dependencies(step, made, resources)
+    ]
+    if problems:
+        raise InputError(list(dict.fromkeys(problems)))
+
+
+def _dependencies(step: Step, made: Sequence[str], resources: Mapping[str, Resource]) -> Iterator[str]:
+    kept = made[0]
+    maker = kept.rpartition(".")[0]
+    if maker != step.node:
+        yield f"it continues '{kept}', which is kept from frame to frame; write to a texture that is not kept"
+        return
+    others = [write.resource for write in step.writes if write.resource not in made]
+    if others:
+        yield f"it makes '{kept}', which is kept, and '{others[0]}', which is not; make them in two steps"
+    if step.kind == "geometry":
+        yield f"it makes '{kept}', which is kept, from the scene's objects, which may move"
+    if step.region is not None:
+        yield f"it makes '{kept}', which is kept, in a region that `update` sets in each frame"
+    for read in step.all_reads:
+        if read.previous:
+            yield f"it makes '{kept}', which is kept, from last frame's '{read.resource}', another in each frame"
+        elif read.resource not in resources or resources[read.resource].role not in ("kept", "scene"):
+            yield f"it makes '{kept}', which is kept, from '{read.resource}', which is not; keep that too: `kept=True`"

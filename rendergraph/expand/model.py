@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from msgspec import Struct, field
 
 from rendergraph.link import Endpoint
-from rendergraph.link.infer import CAMERA
+from rendergraph.link.infer import CAMERA as CAMERA
 from rendergraph.steps import Resource, Step
 
 ENVIRONMENT = Endpoint("", "the scene's environment")
@@ -63,6 +63,3 @@ def follow_forwards(forwarded: Mapping[Endpoint, Endpoint], end: Endpoint) -> En
     while end in forwarded:
         end = forwarded[end]
     return end
-
-
-__all__ = ["CAMERA", "ENVIRONMENT", "Expansion", "VersionedSteps", "ViewTable", "follow_forwards"]

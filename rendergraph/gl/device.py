@@ -110,7 +110,6 @@ class Device(Struct, eq=False, dict=True):
         return self.renderer.startswith("zink (llvmpipe") and version is not None and int(version[1]) <= 22
 
     def bind_block(self, buffer: moderngl.Buffer, point: int) -> None:
-        """Bind a buffer to the point of a uniform block."""
         buffer.bind_to_uniform_block(point)
         if self.stores_blocks:
             buffer.bind_to_storage_buffer(point)
@@ -129,7 +128,6 @@ class Device(Struct, eq=False, dict=True):
         }
 
     def release(self) -> None:
-        """End the context if it is owned."""
         if self.mips is not None:
             with self.current():
                 self.mips.release()
@@ -219,7 +217,6 @@ def _egl() -> Any:
 
 
 def _system_loader() -> Callable[[str], int]:
-    """Return a loader of GL functions of the current context."""
     for library, name in (("libEGL.so.1", "eglGetProcAddress"), ("libGL.so.1", "glXGetProcAddressARB")):
         try:
             function = getattr(ctypes.CDLL(library), name)

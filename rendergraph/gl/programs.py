@@ -48,8 +48,6 @@ ProgramError = moderngl.Error
 
 
 class Uniform(Struct, frozen=True):
-    """One active uniform of the default block."""
-
     name: str
     type: int
     size: int
@@ -65,7 +63,6 @@ class Uniform(Struct, frozen=True):
 
     @property
     def number_count(self) -> int:
-        """Numbers in one element."""
         ending = _VALUES[self.type][1]
         return int(ending[-3]) ** 2 if "Matrix" in ending else int(ending[0])
 
@@ -131,7 +128,6 @@ class Program(Struct, eq=False):
         return write
 
     def bind_block(self, name: str, binding: int) -> None:
-        """Give a uniform or storage block its binding point."""
         if name in self.blocks:
             self.device.raw.glUniformBlockBinding(self.glo, self.blocks[name], binding)
         elif name in self.storage:
@@ -203,7 +199,6 @@ def driver_message(error: Exception) -> tuple[str | None, str]:
 
 
 def outputs_of(program: Program) -> dict[str, str]:
-    """Return the GLSL types of a program's color outputs by their names."""
     raw, glo = program.device.raw, program.glo
     found, kind = {}, (ctypes.c_int * 1)()
     for index in range(_count(raw, glo, _OUTPUT)):

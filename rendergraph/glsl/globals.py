@@ -18,8 +18,6 @@ _MACRO = re.compile(r"^[ \t]*#[ \t]*define[ \t]+([A-Za-z_]\w*)[ \t]+(\d{1,9})[ \
 
 
 class Token(str):
-    """A token with its position."""
-
     __slots__ = ("at",)
 
     at: int
@@ -69,7 +67,6 @@ class Globals(Struct, frozen=True):
 
 
 def globals_of(text: str) -> Globals:
-    """Return the declarations of a text without comments."""
     plain = without_directives(text)
     found: dict[str, Global] = {}
     input_layout: dict[str, tuple[str, ...]] = {}

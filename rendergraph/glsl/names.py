@@ -80,7 +80,6 @@ def calls(text: str, function: str) -> bool:
 
 
 def mentions(text: str, name: str) -> bool:
-    """Whether a text contains a name as a whole word."""
     return next(_places(text, name), None) is not None
 
 
@@ -95,7 +94,6 @@ def _places(text: str, name: str) -> Iterator[int]:
 
 
 def _before(text: str, at: int) -> str:
-    """Return the word or sign before a position."""
     while at and text[at - 1].isspace():
         at -= 1
     begin = at

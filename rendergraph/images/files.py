@@ -45,7 +45,6 @@ def staged(paths: Sequence[Path]) -> Iterator[list[Path]]:
 
 
 def write_file(path: Path, content: str | bytes) -> None:
-    """Write a file that appears whole or not at all."""
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     with staged([path]) as (part,):
         part.write_bytes(data)

@@ -89,7 +89,6 @@ class Film:
             raise self._failed(error) from error
 
     def drop(self) -> None:
-        """Remove a film that is not complete."""
         writer, self._writer = self._writer, None
         if writer is not None:
             writer.close()

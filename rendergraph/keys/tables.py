@@ -144,7 +144,6 @@ def plain(value: Value, type: Type) -> Any:
 
 
 def schema(type: Type) -> Schema:
-    """Return the JSON Schema of a type."""
     if isinstance(type, Recursive):
         return {"anyOf": [json_schema(type.type), {"$ref": "#"}]}
     if isinstance(type, Table):

@@ -36,12 +36,10 @@ def choice(*words: str) -> Any:
 
 
 def number(low: float = -MOST, high: float = MOST, *, above: bool = False, infinite: bool = False) -> Any:
-    """A number within limits; see `Range`."""
     return Annotated[float, Range(low, high, above, infinite)]
 
 
 def whole(low: int, high: float = MOST) -> Any:
-    """A whole number within limits, inclusive."""
     return Annotated[int, Range(low, high)]
 
 

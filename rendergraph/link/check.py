@@ -98,7 +98,6 @@ class Checker(Struct, eq=False):
         self.problems.append(link.value.problem(code, text + way))
 
     def _fitting(self, port: Port, link: Link, nodes: Iterable[UnlinkedNode]) -> str:
-        """Suggest outputs of these nodes."""
         fit = [
             f"'{end}'"
             for node in nodes

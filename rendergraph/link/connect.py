@@ -38,7 +38,6 @@ class Connector(Struct, eq=False):
                 self.report(value.problem("RG111", text, key=True))
 
     def complete(self, draft: UnlinkedNode, written: Mapping[str, UnlinkedNode]) -> None:
-        """Report required inputs that have no link."""
         by_link: dict[int, list[str]] = {}
         for name, port in draft.inputs.items():
             if draft.links[name] or port.optional or name in draft.failed or self._dropped(draft, name):
@@ -113,7 +112,6 @@ class Connector(Struct, eq=False):
         draft.failed.update(missing)
 
     def _source_for(self, draft: UnlinkedNode, port: Input | InOut) -> str:
-        """Suggest a port of the file that fits."""
         wanted = port.semantic
         for other in self.spec.nodes.values():
             if other.scope != draft.spec.scope or other.id == draft.spec.id or other.type not in self.catalog:

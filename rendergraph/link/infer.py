@@ -382,6 +382,3 @@ def output_ends(draft: UnlinkedNode) -> Iterator[Endpoint]:
     for name, port in draft.ports.items():
         if not isinstance(port, Input):
             yield Endpoint(draft.spec.id, name)
-
-
-__all__ = ["CAMERA", "TextureInference", "output_ends"]

@@ -89,7 +89,6 @@ def sampler_of(read: Read, resource: Resource) -> str:
 
 
 def named_reads(step: Step) -> Iterator[tuple[str, Read]]:
-    """Yield the reads of a step and of the functions it calls, by their names in the program."""
     yield from ((read.name, read) for read in step.reads)
     for function in step.functions:
         yield from ((prefix(function.node) + read.name, read) for read in function.reads)
@@ -102,7 +101,6 @@ def _sampled(step: Step, resources: Mapping[str, Resource]) -> Iterator[tuple[st
 
 
 def unfit_sampler(step: Step, declared: str, read: Read, resources: Mapping[str, Resource]) -> Problem | None:
-    """Return the problem of a sampler type for a read; None if it fits."""
     right = sampler_of(read, resources[read.resource])
     if declared == right:
         return None

@@ -78,7 +78,6 @@ def _origin(value: Value) -> str:
 
 
 def _short(source: Source) -> str:
-    """Name shipped files without their folder."""
     shipped = folder("rendergraph.pipelines")
     if source.path is not None and source.path.is_relative_to(shipped):
         return source.path.stem

@@ -40,7 +40,6 @@ def projection_matrix(camera: Camera, aspect: float) -> Matrix:
 
 
 def bounding_sphere(scene: Scene) -> tuple[Vec3, float]:
-    """Centre and radius of a sphere around everything drawn."""
     low, high = (np.array(corner) for corner in scene.bounds)
     return vec3((low + high) / 2), max(float(np.linalg.norm(high - low)) / 2, 1e-6)
 

@@ -18,7 +18,6 @@ Corners: TypeAlias = npt.NDArray[np.float64]
 
 
 def selected(scene: Scene, name: str) -> list[int]:
-    """Indices of the objects in a selection, in the scene's order."""
     takes = SELECTIONS[name]
     return [
         number

@@ -172,7 +172,6 @@ def _readable_path(source: ImageSource, kind: str) -> Iterator[str]:
 
 
 def _first_bytes(source: ImageSource, count: int = 32) -> tuple[bytes, int]:
-    """The first bytes and the length of the encoded image."""
     if source.data is not None:
         return source.data[:count], len(source.data)
     try:

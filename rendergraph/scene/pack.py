@@ -192,7 +192,6 @@ def _materials(scene: Scene) -> dict[str, Any]:
 
 
 def _placed(scene: Scene, meshes: Records) -> dict[str, Any]:
-    """What objects are packed to."""
     objects = scene.objects
     mesh = np.array([entry.mesh for entry in objects], np.int32)
     material = np.array([entry.material for entry in objects], np.int32)

@@ -101,7 +101,6 @@ class Reading(Struct):
                 self.warn("RG333", "unmapped", text)
 
     def error(self, code: str, text: str, *, line: int = 0, file: Path | None = None) -> InputError:
-        """Return an error in this file, to be raised by the caller."""
         return InputError(Problem(code, text, self._place(line, file)))
 
     def over(self, what: str, limit: str) -> InputError:

@@ -146,7 +146,6 @@ def moving(section: str) -> dict[str, Key]:
 
 
 def _keyframes() -> Schema:
-    """Paths with what their keys take."""
     found = {}
     for section in ANIMATED:
         name = "" if section == "environment" else r"\..+"

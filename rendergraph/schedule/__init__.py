@@ -27,7 +27,8 @@ from rendergraph.schedule.dependencies import (
     read_first_choices,
 )
 from rendergraph.schedule.model import Cost, Model, alive_all_frame
-from rendergraph.schedule.reasons import culled_reasons, order_reasons, step_names
+from rendergraph.schedule.reasons import culled_reasons, order_reasons
+from rendergraph.schedule.reasons import step_names as step_names
 from rendergraph.schedule.seeds import program_order, random_order, seeds
 from rendergraph.steps import MOST_STEPS, Resource, Step
 
@@ -252,6 +253,3 @@ def _ordered(model: Model, budget: int) -> tuple[Sequence[int], Cost, int, int]:
         if improved[:2] < cost[:2]:
             cost, best = improved, better
     return best, cost, least, bound
-
-
-__all__ = ["Schedule", "schedule", "step_names"]

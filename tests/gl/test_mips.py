@@ -8,7 +8,6 @@ import pytest
 
 import rendergraph as rg
 from rendergraph.gl import textures
-from rendergraph.gl.mips import fill_mips
 from rendergraph.textures import TextureDesc, full_mip_count
 
 
@@ -32,7 +31,7 @@ def test_levels_are_exact_means(gl: rg.Session, format: str, size: tuple[int, in
     with device.current():
         texture = textures.create(device, desc)
         textures.upload(device, texture, texels)
-        fill_mips(device, texture)
+        textures.fill_mips(device, texture)
         levels = [textures.read(device, texture, mip=mip)[0] for mip in range(desc.mips)]
         textures.delete(device, texture)
     expected = texels.astype(np.float64)[::-1]  # the top row is read first

@@ -159,7 +159,6 @@ class _Block:
         return np.searchsorted(self._newlines, offsets)
 
     def read(self) -> None:
-        """Add everything in the block to what is parsed."""
         kinds = self._kinds()
         rows = [np.flatnonzero(kinds == kind) for kind in range(4)]
         limit = self.reading.limits.vertices
