@@ -85,6 +85,7 @@ def messages_read(source: str) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 def test_no_code_reads_a_message() -> None:
     """Whoever wants to know what a mistake is about asks its subject, its kind, its place or its code."""
     assert messages_read('if "x" in problem.text: pass\nre.match("a", mistake.text)\nstr(problem).split()') == [1, 2, 3]
@@ -111,6 +112,7 @@ def problems_edited(source: str) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 def test_a_problem_is_relocated_and_never_edited_on_its_way_up() -> None:
     """`Problem.relocate` gives it another place, a context and a hint."""
     assert problems_edited('f"in x: {problem.text}"\nproblem.message + "; or"\nreplace(problem, place=p)') == [1, 2, 3]

@@ -46,6 +46,7 @@ def circles(edges: set[tuple[str, str]]) -> list[list[str]]:
     return sorted(sorted(group) for group in found if len(group) > 1 or (*group, *group) in edges)
 
 
+@pytest.mark.slow
 def test_no_module_reaches_itself() -> None:
     """What functions import counts too, but for the package's own, by which its names are there when they are wanted."""
     edges = {

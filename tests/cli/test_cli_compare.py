@@ -210,6 +210,7 @@ def test_a_sweep_of_which_nothing_can_be_drawn_says_why(cli: Any, tmp_path: Path
         assert [row["run"] for row in csv.DictReader(file)] == ["a.mode=3"]
 
 
+@pytest.mark.slow
 def test_a_search_is_a_sweep_s_file_too(cli: Any, tmp_path: Path) -> None:
     pytest.importorskip("optuna")
     (tmp_path / "study.yaml").write_text(
@@ -337,6 +338,7 @@ def test_an_interrupted_sweep_keeps_what_is_drawn_and_says_how_to_go_on(cli: Any
 # --- variants by settings, ports, tables -----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_settings_make_variants_of_one_pipeline(cli: Any) -> None:
     words = ("--size", "32x18", "-n", "1", "--json")
     told = cli(
@@ -369,6 +371,7 @@ def test_variants_and_ports_that_cannot_be_are_told(cli: Any, words: list[str], 
     assert message in result.err
 
 
+@pytest.mark.slow
 def test_any_port_is_measured(cli: Any, gl: rg.Session, tmp_path: Path) -> None:
     size = (32, 18)
     names = ("ssao-hemisphere", "ssao-disc")
@@ -384,6 +387,7 @@ def test_any_port_is_measured(cli: Any, gl: rg.Session, tmp_path: Path) -> None:
     assert [variant["rmse"] for variant in against["variants"]] == pytest.approx([0, expected], abs=2e-3)
 
 
+@pytest.mark.slow
 def test_a_sweep_keeps_typed_values_and_a_table(cli: Any, tmp_path: Path) -> None:
     axes = ("-x", "ao.samples=8,16", "-x", "light.ambient=0.5,[0.1, 0.2, 0.3]")
     words = ("--metric", "ao.occlusion", "--size", "16x9", "-n", "1", "--csv", "-o", "out")

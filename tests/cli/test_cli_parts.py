@@ -52,6 +52,7 @@ def write(folder: Path) -> None:
 
 
 # imageio-ffmpeg leaves the pipes of its process to be closed when they are collected.
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_frames_in_parts_and_films_are_those_of_one_process(cli: Any, tmp_path: Path) -> None:
     words = (
@@ -94,6 +95,7 @@ def test_frames_in_parts_and_films_are_those_of_one_process(cli: Any, tmp_path: 
     assert np.abs(shown - read(tmp_path / "a" / "f.05.png")[..., :3]).mean() < 12  # colours at half the resolution
 
 
+@pytest.mark.slow
 def test_frames_that_depend_on_those_before_say_so_or_begin_as_early_as_is_declared(cli: Any, tmp_path: Path) -> None:
     write(tmp_path)
     words = ("--frames", "3-12", "--executor", "processes:2", "--json", "-o", "there.##.exr")

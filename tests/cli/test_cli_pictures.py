@@ -40,6 +40,7 @@ def test_a_picture_draws_itself_again(cli: Any, tmp_path: Path) -> None:
     assert not np.array_equal(read(tmp_path / "light.exr"), read(tmp_path / "other.exr"))
 
 
+@pytest.mark.slow
 def test_it_knows_its_camera_its_frame_and_its_scene(cli: Any, turning: str, tmp_path: Path) -> None:
     assert cli("run", turning, *SMALL, "--camera", "two", "--fps", "24", "--frames", "7-7", "-o", "a.png").code == 0
     said = read_metadata(tmp_path / "a.png")
@@ -53,6 +54,7 @@ def test_it_knows_its_camera_its_frame_and_its_scene(cli: Any, turning: str, tmp
     np.testing.assert_array_equal(frame["image"][..., :3], read(tmp_path / "a.png"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verb", ["check", "plan", "graph", "config", "bench"])
 def test_every_verb_takes_a_picture(cli: Any, turning: str, verb: str) -> None:
     assert cli("run", turning, *SMALL, "-o", "a.png").code == 0
@@ -85,6 +87,7 @@ def test_what_a_picture_says_reaches_nothing_outside(
         assert ("RG012" in result.err) or ("RG011 there is no file './scene.yaml'" in result.err), result.err
 
 
+@pytest.mark.slow
 def test_pictures_are_compared_as_they_are(cli: Any, tmp_path: Path) -> None:
     assert cli("run", "forward", *SMALL, "-o", "soft.png").code == 0
     assert cli("run", "forward", *SMALL, "-s", "shadows.taps=1", "-o", "hard.png").code == 0

@@ -75,6 +75,7 @@ def test_run_json_has_the_contract_s_fields(cli: Any) -> None:
     assert report["outputs"] == ["a.exr"]
 
 
+@pytest.mark.slow
 def test_a_picture_gives_its_pipeline_back(cli: Any, tmp_path: Path) -> None:
     for name in ("a.exr", "a.png"):
         assert cli("run", "forward", *SMALL, "-s", "light.ambient=0.25", "-o", name).code == 0

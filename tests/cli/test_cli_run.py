@@ -230,6 +230,7 @@ def test_an_empty_word_is_no_path_and_a_root_is_a_folder(
     assert message in found.err
 
 
+@pytest.mark.slow
 def test_names_of_any_bytes_are_names(cli: Any) -> None:
     name = "a\udcff"
     small = ("--size", "8x8", "-s", "sun.resolution=64", "-n", "1")

@@ -26,6 +26,7 @@ def test_nothing_cannot_be_compared(gl: rg.Session) -> None:
         compare([], session=gl)
 
 
+@pytest.mark.slow
 def test_one_pipeline_and_a_reference_by_their_names(gl: rg.Session, tmp_path: Path) -> None:
     found = compare(rg.load("overdraw", size=(8, 8)), "overdraw", frames=1, session=gl)
     assert [result.metrics for result in found.results] == [SAME]
@@ -47,6 +48,7 @@ def test_a_pipeline_against_itself_is_nothing_but_zeros(gl: rg.Session) -> None:
         assert not result.difference
 
 
+@pytest.mark.slow
 def test_variants_are_measured_against_the_first(gl: rg.Session) -> None:
     base = rg.load("forward", size=SIZE)
     others = [base.set("display.curve", "aces"), rg.load("forward-prepass", size=SIZE)]

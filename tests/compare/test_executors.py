@@ -25,6 +25,7 @@ from rendergraph.farm import dask_cluster
 from rendergraph.farm.processes import Processes
 
 distributed: Any = pytest.importorskip("distributed")
+pytestmark = pytest.mark.slow  # they start processes
 
 MAKE = """// Stripes.
 /*---
@@ -333,7 +334,6 @@ def cluster(processes: Cluster) -> Cluster:
     return processes
 
 
-@pytest.mark.slow
 def test_64_variants_are_the_same_by_dask_though_a_worker_is_killed_and_no_disk_is_shared(
     base: rg.Pipeline, gl: rg.Session, cluster: Cluster, tmp_path: Path
 ) -> None:
@@ -384,7 +384,6 @@ def test_what_was_lost_with_all_workers_is_sent_to_the_next(
     same(here, tmp_path / "here", there, tmp_path / "there")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("error", [OSError("closed"), KeyError("tcp://10.0.0.1:1"), ValueError("no replicas")])
 def test_what_a_worker_does_not_get_as_it_goes_is_sent_to_others(
     monkeypatch: pytest.MonkeyPatch, error: Exception

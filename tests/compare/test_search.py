@@ -128,6 +128,7 @@ def test_no_run_is_asked_for_twice_and_all_there_are_is_enough(
     assert (again.resumed, again.search) == (10, found.search)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(st.dictionaries(st.text(max_size=3), st.tuples(*[st.integers(0, 5)] * 3), max_size=12))
 def test_the_front_is_what_none_beats(values: dict[str, tuple[int, ...]]) -> None:

@@ -31,6 +31,7 @@ def striped(folder: Path) -> Path:
     return folder / "floor.yaml"
 
 
+@pytest.mark.slow
 def test_what_is_seen_at_an_angle_stays_sharp_along_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = striped(tmp_path)
 

@@ -144,6 +144,7 @@ def _same(a: Mapping[str, Any], b: Mapping[str, Any]) -> None:
 KINDS = st.sampled_from(["mix", "tally", "stamp"])
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], derandomize=True)
 @given(
     parents=st.lists(

@@ -129,6 +129,7 @@ def test_a_shader_sees_the_time_however_it_names_it(bench: Any, text: str) -> No
     assert seen == [0.0, 0.5, 1.0]
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], derandomize=True)
 @given(
     parents=st.lists(

@@ -25,6 +25,7 @@ def of(events: list[Any], name: str) -> list[type]:
     return [type(event) for event in events if event.task.name == name]
 
 
+@pytest.mark.slow
 def test_what_is_lost_is_tried_again_and_given_up_at_last(chore: Chores, tmp_path: Path) -> None:
     """Two processes, and every way in which a task ends, in one go."""
     with Processes(2, timeout=2.0) as farm:

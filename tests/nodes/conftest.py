@@ -19,6 +19,14 @@ Floats = npt.NDArray[np.float64]
 Evaluate = Callable[..., Floats]
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Count what renders a technique, or compiles its shaders, as slow."""
+    for item in items:
+        if Path(__file__).parent in item.path.parents and {"gl", "session"} & set(getattr(item, "fixturenames", ())):
+            item.add_marker("slow")
+
+
 @pytest.fixture(scope="session")
 def gl() -> Iterator[Any]:
     """A bare GL context; tests skip where there is none."""

@@ -158,6 +158,7 @@ def test_types_that_fit_the_links_come_before_those_that_want_others(service: Re
     assert not set(sun["types"]) & set(sun["other_types"])
 
 
+@pytest.mark.slow
 def test_a_variant_reads_back_to_what_was_on_the_page(service: RenderService, tmp_path: Path) -> None:
     changed = replace(FORWARD, sets=("display.exposure=1.5", "shadows.type=shadow_vsm", "light.smith=fast"))
     service.answer(RenderRequest(changed))
