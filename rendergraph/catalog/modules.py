@@ -45,7 +45,10 @@ def load(name: str, listed: Listed) -> NodeType:
         text = f"the module of node type '{name}' must define one Node class, it has {names}"
         raise InputError(Problem("RG492", text, place))
     (cls,) = classes
-    if problems := declaration_mistakes(cls):
+    problems = declaration_mistakes(cls)
+    if not problems and not cls.ports():
+        problems = [Problem("RG490", "the class has no ports; add an output, as in `color = Output(Radiance, doc=…)`")]
+    if problems:
         who = f"node type '{name}'"
         raise InputError([p.relocate(declaration_of(cls, listed.file, p.subject), context=who) for p in problems])
     bases = [base.__module__ for base in cls.__mro__[1:] if issubclass(base, Node) and base is not Node]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import importlib
 import os
 import signal
@@ -16,7 +17,7 @@ from typing import NoReturn
 from rendergraph import activity
 from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import only_data, print_error, say, set_quiet
-from rendergraph.errors import Interruption, Place, Problem, RendergraphError, suggestion
+from rendergraph.errors import InputError, Interruption, Place, Problem, RendergraphError, is_framework, suggestion
 from rendergraph.version import __version__
 
 _MODULES = {
@@ -179,8 +180,12 @@ def main(args: Sequence[str]) -> int:
         if os.environ.get("RENDERGRAPH_TRACEBACK"):
             raise
         where = Place(str(error.filename)) if error.filename else None
-        return fail([Problem("RG509", error.strerror or str(error), where)], 1, as_json)
+        code = InputError.exit_code if error.errno == errno.ENAMETOOLONG else 1
+        return fail([Problem("RG509", error.strerror or str(error), where)], code, as_json)
     except BaseException as error:  # SystemExit in third-party code, too
+        if isinstance(error, ImportError) and not is_framework(error.name or ""):
+            text = f"a library that rendergraph needs does not load: {error}; install it again"
+            return fail([Problem("RG509", text)], 1, as_json)
         if os.environ.get("RENDERGRAPH_TRACEBACK"):
             raise
         return fail([unexpected(error)], 1, as_json)

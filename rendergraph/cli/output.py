@@ -19,6 +19,8 @@ _RED, _YELLOW, _BOLD, _PLAIN = "\x1b[1;31m", "\x1b[1;33m", "\x1b[1m", "\x1b[0m"
 _CONTROL = "[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]"
 
 
+_SCREENFUL = 10
+"""Errors that are printed, of three lines each; `--json` lists all."""
 _DATA: ContextVar[TextIO | None] = ContextVar("data")
 """The process's stdout while a verb runs."""
 
@@ -133,12 +135,13 @@ def say_summary(report: dict[str, Any]) -> None:
 
 def print_error(problems: Sequence[Problem], exit_code: int, *, as_json: bool) -> None:
     """Print why a verb stopped: in words on stderr, and as the document of `--json` on stdout."""
-    for problem in problems:
+    for problem in problems[:_SCREENFUL]:
         print_problem(problem)
-    from rendergraph.keys import MOST_PROBLEMS
+    if (more := len(problems) - _SCREENFUL) > 0:
+        from rendergraph.keys import MOST_PROBLEMS
 
-    if len(problems) >= MOST_PROBLEMS:
-        say(f"these are the first {len(problems)} errors; there may be more", always=True)
+        least = "at least " if len(problems) >= MOST_PROBLEMS else ""
+        say(f"and {least}{amount(more, 'more error')}; --json lists {len(problems)}", always=True)
     if as_json:
         emit_json({"error": error_document(problems, exit_code)})
 

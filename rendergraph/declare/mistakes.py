@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping
-from inspect import get_annotations
+from inspect import get_annotations, getattr_static
 from typing import Literal, get_args, get_origin
 from weakref import WeakSet
 
@@ -21,6 +21,7 @@ _IDENTIFIER = re.compile(r"[a-z][a-z0-9_]*\Z")
 _MACRO = re.compile(r"[A-Za-z0-9_-]+")
 
 _OF_THE_BASE = frozenset(name for name in vars(Node) if not name.startswith("_"))
+_CLASS_METHODS = [name for name, value in vars(Node).items() if isinstance(value, classmethod)]
 
 # Words that cannot be a GLSL identifier, that hide a built-in function used everywhere, or that the base class owns.
 RESERVED_NAMES: frozenset[str] = (
@@ -68,6 +69,9 @@ def declaration_mistakes(cls: type[Node], *, lenient: bool = False) -> list[Prob
     """
     if cls in _SOUND:
         return []
+    for name in _CLASS_METHODS:
+        if getattr_static(cls, name) is not vars(Node)[name]:
+            return [_problem(name, f"'{name}' is reserved by the node's base class; choose another name")]
     try:
         cls.parameters()
     except Exception as error:  # whatever evaluating an annotation raises

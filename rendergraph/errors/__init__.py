@@ -291,7 +291,7 @@ def node_named(node: str, node_type: str) -> str:
 
 def suggestion(word: str, words: Iterable[str], *, most: int = 12) -> str:
     """Return `; did you mean 'x'?`, or the names that begin with the word, or a short list of all, or nothing."""
-    known = sorted(set(words))
+    known = sorted({str(word) for word in words})  # a file's names may be numbers
     family = [name for name in known if name.lower().replace("-", "_").partition("_")[0] == word.lower()]
     if len(family) > 1:
         more = f" or {len(family) - 4} more" if len(family) > 5 else ""

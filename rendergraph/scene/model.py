@@ -157,6 +157,10 @@ class ImageSource(Struct, frozen=True):
     size: tuple[int, int] | None = None
     channels: int = 0
 
+    def __repr__(self) -> str:
+        embedded = f", {len(self.data)} bytes" if self.data is not None else ""
+        return f"<ImageSource {self.label or self.path}{embedded}>"
+
 
 class MadeImage(Struct, frozen=True):
     """A generated image: `make` returns float16 (height, width, 4), top row first; `size` is its width and height."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Union
 
-from msgspec import UNSET, Meta, Struct, UnsetType, ValidationError, convert
+from msgspec import UNSET, Meta, Struct, UnsetType, ValidationError, convert, json
 
 from rendergraph.errors import Problem, UsageError
 from rendergraph.scene.model import Camera
@@ -160,9 +160,11 @@ class SaveMessage(PageMessage, frozen=True):
 _MESSAGES: Any = Union[tuple(PageMessage.__subclasses__())]  # noqa: UP007  # a tuple of types
 
 
-def parse_message(message: Mapping[str, Any]) -> PageMessage:
+def parse_message(text: str) -> PageMessage:
     try:
-        parsed: PageMessage = convert(message, _MESSAGES)
+        parsed: PageMessage = convert(json.decode(text, type=dict[str, Any]), _MESSAGES)
     except ValidationError as error:
+        if not text.lstrip().startswith("{"):
+            raise
         raise UsageError(Problem("RG500", f"malformed request from the page: {error}")) from None
     return parsed

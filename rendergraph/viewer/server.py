@@ -20,7 +20,6 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 import msgspec
 import uvicorn
@@ -222,14 +221,12 @@ class Server:
                 await page.socket.close(1008, "too many messages")
                 return
             try:
-                message = msgspec.json.decode(text, type=dict[str, Any])
+                self._apply(page, parse_message(text))
+            except RendergraphError as error:
+                page.put("refused", _text("refused", {"problems": _problems(error)}))
             except (msgspec.DecodeError, RecursionError):
                 await page.socket.close(1007, "not a JSON object")
                 return
-            try:
-                self._apply(page, parse_message(message))
-            except RendergraphError as error:
-                page.put("refused", _text("refused", {"problems": _problems(error)}))
 
     def _apply(self, page: Page, message: PageMessage) -> None:
         match message:
@@ -395,8 +392,7 @@ class _Guard:
             return False
         if not origin:
             return bool(scope["type"] != "websocket")  # a browser always names the origin of a socket
-        page = urlsplit(origin[0])
-        return page.scheme in ("http", "https") and page.netloc == host[0]
+        return origin[0] in (f"http://{host[0]}", f"https://{host[0]}")
 
 
 def _bind(host: str, port: int) -> socket.socket:

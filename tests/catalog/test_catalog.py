@@ -128,6 +128,14 @@ def test_two_of_one_name(plugin: Path, tmp_path: Path) -> None:
             GOOD.replace("._shared import SIZE", "math import pi as SIZE").replace("radiance =", "filter ="),
             r"odd.py:\d+:5: RG490 node type 'odd': 'filter' is reserved",
         ),
+        (
+            "from rendergraph.api import Node\n\nclass Odd(Node):\n    '''Odd.'''\n\n    ports = 3\n",
+            r"odd.py:6:5: RG490 node type 'odd': 'ports' is reserved by the node's base class; choose another name",
+        ),
+        (
+            "from rendergraph.api import Node\n\nclass Odd(Node):\n    '''Odd.'''\n",
+            r"odd.py:3:1: RG490 node type 'odd': the class has no ports; add an output",
+        ),
     ],
 )
 def test_a_wrong_module_is_told_with_its_file(tmp_path: Path, text: str, message: str) -> None:

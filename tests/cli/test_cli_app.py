@@ -171,6 +171,13 @@ def test_errors_become_messages_and_exit_codes(cli: Any, fake: Any, kind: Any, c
         (EOFError("marshal data too short"), 1, "RG599 internal error (a bug in rendergraph): EOFError: marshal data"),
         (MemoryError(), 1, "RG509 out of memory"),
         (OSError(28, "No space left on device", "x"), 1, "x: RG509 No space left on device"),
+        (OSError(36, "File name too long", "x"), 3, "x: RG509 File name too long"),
+        (
+            ImportError("No module named 'numpy'", name="numpy"),
+            1,
+            "RG509 a library that rendergraph needs does not load",
+        ),
+        (ImportError("cannot import", name="rendergraph.x"), 1, "RG599 internal error (a bug in rendergraph): Import"),
         (BrokenPipeError(), 0, ""),
     ],
 )

@@ -12,7 +12,7 @@ import pytest
 from rendergraph.errors import InputError
 from rendergraph.resources import shipped_scenes
 from rendergraph.scene.load import load
-from rendergraph.scene.model import Scene, SceneLimits
+from rendergraph.scene.model import ImageSource, Scene, SceneLimits
 
 EXAMPLE = """
 scene: 1
@@ -177,6 +177,20 @@ WRONG = {
     "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {}}": "are empty, not a mapping of seconds to values",
     "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {1: null}}": "keyframe 1 s of 'cameras.m.eye' has no value",
 }
+
+
+def test_names_that_are_numbers_are_mistakes_beside_others(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as error:
+        read(tmp_path, "scene: 1\nmaterials: {1: {}, red: {}}\nobjects: {a: {shape: box, material: rad}}\n")
+    texts = [problem.text for problem in error.value.problems]
+    assert texts == [
+        "'1' is not a name; use text without control characters",
+        "there is no material 'rad'; did you mean 'red'?",
+    ]
+
+
+def test_an_image_prints_its_name_and_size() -> None:
+    assert repr(ImageSource(Path("a.glb"), b"\0" * 1000, "wood")) == "<ImageSource wood, 1000 bytes>"
 
 
 @pytest.mark.parametrize("text", WRONG)

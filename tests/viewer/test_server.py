@@ -61,7 +61,7 @@ def test_another_host_is_refused(served: Any, host: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "origin", ["http://evil.example", "null", "file://", "http://127.0.0.1:1", "https://localhost"]
+    "origin", ["http://evil.example", "null", "file://", "http://127.0.0.1:1", "https://localhost", "http://["]
 )
 def test_another_page_is_refused(served: Any, origin: str) -> None:
     assert get(served, served.path, Origin=origin)[0] == 403
@@ -282,6 +282,12 @@ def test_malformed_messages_are_refused_in_words(served: Any, message: dict[str,
         tab.say(**message)
         assert "Traceback" not in json.dumps(tab.hear("refused")[0])
     alive(served)
+
+
+def test_a_number_beyond_any_is_refused_in_words(served: Any) -> None:
+    with served.tab() as tab:
+        tab.socket.send('{"do": "frame", "number": 1e999}')
+        assert "Number out of range" in tab.hear("refused")[0]["problems"][0]["text"]
 
 
 @pytest.mark.parametrize("text", ["{", "[]", "1", "[" * 5_000, '{"do": "undo"' + " " * 70_000 + "}", "\x00"])

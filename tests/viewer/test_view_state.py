@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ def state(tmp_path: Path) -> ViewState:
 
 
 def say(state: ViewState, **message: Any) -> bool:
-    return state.apply(parse_message(message))
+    return state.apply(parse_message(json.dumps(message)))
 
 
 def test_the_request_holds_everything_that_was_changed(state: ViewState) -> None:
