@@ -329,9 +329,3 @@ def test_the_comparison_is_what_the_files_give(gl: Any, tmp_path: Path, monkeypa
         assert float(size) == pytest.approx(float(str(result.memory["allocated_bytes"])) / (1 << 20), abs=0.06)
     difference = np.abs(made.side_by_side(found).astype(np.float64) - read(made.PICTURE)[..., :3])
     assert difference.mean() < 1.0, "run docs/_generate/comparison.py again"
-
-
-def test_links_of_the_readme_lead_somewhere() -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    for target in re.findall(r"\]\((?!https?:)([^)#]+)", text):
-        assert (ROOT / target).exists(), target

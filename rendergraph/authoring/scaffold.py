@@ -36,7 +36,7 @@ _IDS_OF_FORWARD = ("sun", "shadows", "light", "display")  # ids that the templat
 _IN_PLACE = {
     "imports": "from pathlib import Path",
     "where": "HERE = Path(__file__).parent",
-    "pipeline": 'HERE / "@name@.yaml"',
+    "pipeline": 'HERE / "@file@.yaml"',
     "plugins": ', plugins=[HERE / "@name@.py"]',
 }
 _IN_PACKAGE = {
@@ -46,11 +46,9 @@ _IN_PACKAGE = {
     "pipeline": 'ROOT / "pipelines" / "@name@.yaml"',
     "plugins": ", plugins=PLUGINS",
 }
-_IN_PROJECT = {
-    "imports": "from pathlib import Path",
-    "where": "PROJECT = Path(__file__).parents[1]",
-    "pipeline": 'PROJECT / "@file@.yaml"',
-    "plugins": ', plugins=[PROJECT / "@nodes@"]',
+_IN_PROJECT = _IN_PLACE | {
+    "where": "HERE = Path(__file__).parents[1]",
+    "plugins": ', plugins=[HERE / "@nodes@"]',
 }
 _PROJECT_NODE = "lens_falloff"
 _ROOTS = ("nodes", "shaders")

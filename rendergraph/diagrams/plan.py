@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import accumulate
+from itertools import accumulate, groupby
 from typing import Any
 
 from rendergraph.allocate import ResourcePlan
@@ -120,21 +120,15 @@ def _resource_json(plan: ResourcePlan, id: str) -> dict[str, Any]:
     return found | {"physical": list(plan.placement[id]), "reason": plan.reasons[id]}
 
 
-def _is_kept(plan: ResourcePlan, step: Step) -> bool:
-    return bool(step.writes) and all(plan.resources[write.resource].role == "kept" for write in step.writes)
-
-
 def _groups(plan: ResourcePlan, every_step: bool) -> list[list[int]]:
     """The positions of the steps of each row."""
     steps = plan.schedule.steps
-    groups: list[list[int]] = []
-    for position, step in enumerate(steps):
-        before = steps[groups[-1][0]] if groups and not every_step and _is_kept(plan, step) else None
-        if before is not None and before.node == step.node and _is_kept(plan, before):
-            groups[-1].append(position)
-        else:
-            groups.append([position])
-    return groups
+
+    def row(position: int) -> str | int:
+        roles = {plan.resources[write.resource].role for write in steps[position].writes}
+        return steps[position].node if roles == {"kept"} and not every_step else position
+
+    return [list(group) for _, group in groupby(range(len(steps)), row)]
 
 
 def _order_rows(plan: ResourcePlan, groups: Sequence[Sequence[int]]) -> list[tuple[str, ...]]:
@@ -142,25 +136,18 @@ def _order_rows(plan: ResourcePlan, groups: Sequence[Sequence[int]]) -> list[tup
     rows: list[tuple[str, ...]] = [("  #", "step", "reads", "writes", "live", "why here")]
     for group in groups:
         steps = [plan.schedule.steps[position] for position in group]
-        inside = {write.resource for step in steps for write in step.writes} if len(group) > 1 else set()
-        continued = {read.resource for step in steps for read in step.reads if read.use == "attach"}  # but not sampled
-        reads = [
-            read.resource + ("@previous" if read.previous else "")
-            for step in steps
-            for read in step.all_reads
-            if read.use != "attach" and read.resource not in inside
-        ]
-        writes = [
-            write.resource + (" (continued)" if write.resource in continued - inside else "")
-            for step in steps
-            for write in step.writes
-        ]
+        own = {write.resource for step in steps[:-1] for write in step.writes}
+        taken = [read for step in steps for read in step.all_reads if read.resource not in own]
+        reads = [read.resource + ("@previous" if read.previous else "") for read in taken if read.use != "attach"]
+        continued = {read.resource for read in taken if read.use == "attach"}  # kept, but not sampled
+        written = [write.resource for step in steps for write in step.writes]
+        writes = [id + (" (continued)" if id in continued else "") for id in written]
         number, name, reason = f"{group[0] + 1:3}", names[steps[0].key], plan.schedule.reasons.get(steps[0].key, "")
         if len(group) > 1:
             number, name = f"{number}–{group[-1] + 1}", f"{steps[0].node} ({len(group)} steps)"
             reason = "kept: they run when their values are new or out of date"
-        most = max(live[position] for position in group)
-        rows.append((number, name, _first(reads), _first(writes), format_bytes(most), reason))
+        most = format_bytes(max(live[position] for position in group))
+        rows.append((number, name, _first(reads), _first(writes), most, reason))
     return rows
 
 
