@@ -109,7 +109,6 @@ def _figure(metric: Added[Metric], a: Floats, b: Floats, names: tuple[str, str])
 
 
 def check_sizes(a: Pixels, b: Pixels, names: tuple[str, str]) -> None:
-    """Raise an InputError if two pictures differ in width or height."""
     if a.shape[:2] != b.shape[:2]:
         sizes = [f"'{name}' has {p.shape[1]}×{p.shape[0]} pixels" for name, p in zip(names, (a, b), strict=True)]
         text = f"{sizes[0]}, but {sizes[1]}; render both at one size: --size {b.shape[1]}x{b.shape[0]}"
@@ -175,7 +174,6 @@ def _ssim(a: Floats, b: Floats) -> float:
 
 
 def _windowed(x: Floats) -> Floats:
-    """Return the Gaussian mean of every window inside the picture."""
     weights = np.exp(-0.5 * np.square((np.arange(_WINDOW) - _WINDOW // 2) / _SIGMA))
     for axis in (0, 1):
         parts = np.lib.stride_tricks.sliding_window_view(x, _WINDOW, axis)

@@ -18,7 +18,6 @@ def is_name(text: str) -> bool:
 
 @cache
 def folder(package: str) -> Path:
-    """Return the folder of a package's files."""
     return Path(import_module(package).__path__[0])
 
 

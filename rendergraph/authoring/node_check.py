@@ -302,7 +302,6 @@ def _is_large(expansion: Expansion) -> bool:
 
 
 def _texels(flags: npt.NDArray[np.bool_], array: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
-    """Reduce flags of bytes or channels to one flag per texel."""
     channels = array.shape[-1] if array.ndim > 1 else 1
     texels: npt.NDArray[np.bool_] = np.any(flags.reshape(array.size // channels, -1), axis=1)
     return texels

@@ -28,7 +28,6 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def _leave() -> None:
-    """All that is left goes with the process, and need not be looked through for cycles."""
     if "OpenImageIO" not in sys.modules:  # whose bindings tell of every object that is still there
         gc.freeze()
 

@@ -80,7 +80,6 @@ EXIT_CODES = {
 
 
 def verb(name: str) -> click.Command:
-    """Import a verb and return its command."""
     module = next((module for module, verbs in _MODULES.items() if name in verbs), name)
     function = "command" if module == name else name.replace("-", "_")
     found: click.Command = getattr(importlib.import_module(f"rendergraph.cli.{module}"), function)
@@ -230,7 +229,6 @@ def _usage(error: click.UsageError) -> Problem:
 
 
 def unexpected(error: BaseException) -> Problem:
-    """Return the message of an exception that should not reach the user."""
     what = f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"
     text = f"internal error (a bug in rendergraph): {what}; RENDERGRAPH_TRACEBACK=1 shows where, please report it "
     return Problem("RG599", text + "with the output of `rendergraph doctor`")
@@ -242,7 +240,6 @@ def _flush() -> None:
 
 
 def _discard_stdout() -> None:
-    """Send the interpreter's last flush nowhere."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

@@ -28,8 +28,6 @@ SOFTWARE = "times on a software rasteriser: not comparable to a GPU"
 
 
 class Threshold(Struct, frozen=True):
-    """A metric and its greatest allowed value."""
-
     metric: str
     most: float
 
@@ -48,7 +46,6 @@ def _threshold(text: str) -> Threshold:
 
 
 def check_thresholds(thresholds: Sequence[Threshold], extensions: Extensions) -> None:
-    """Check that each threshold has a built-in metric or one of a plugin."""
     names = [*_LIMITED, *(added.name for added in extensions.metrics())]
     for metric in dict.fromkeys(one.metric for one in thresholds if one.metric not in names):
         text = f"--fail-above: unknown metric '{metric}'{suggestion(metric, names)}"

@@ -80,7 +80,6 @@ def _settings(ctx: Context, incomplete: str) -> Iterable[str]:
 
 
 def _ports(ctx: Context, incomplete: str) -> list[str]:
-    """Ports that hold a texture."""
     linked = _linked(ctx)
     return [str(end) for end, info in linked.graph.textures.items() if info.desc is not None] if linked else []
 
@@ -97,7 +96,6 @@ families, cameras, settings, ports, taps = map(_words, (_families, _cameras, _se
 
 
 def _values(linked: Linked, node: str, name: str) -> Iterator[str]:
-    """Values of a parameter, connections of an input, or types of a node."""
     node_type = linked.graph[node].type
     if name == "type":
         yield from linked.catalog.names()

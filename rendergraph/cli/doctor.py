@@ -37,7 +37,6 @@ def command(as_json: bool) -> None:
 
 
 def examine() -> dict[str, Any]:
-    """Return everything that `doctor` finds out, as plain JSON values; never raises."""
     found = _probe()
     devices = [device | _probe(str(device["number"])) for device in found.get("devices", [])]
     for device in devices:

@@ -302,7 +302,6 @@ def selection_options(function: F) -> F:
 
 
 def linked(selection: Selection) -> Pipeline:
-    """Return a linked pipeline, and print its warnings."""
     from rendergraph.session import Pipeline
 
     pipeline = Pipeline(selection)
@@ -311,7 +310,6 @@ def linked(selection: Selection) -> Pipeline:
 
 
 def link(selection: Selection) -> Linked:
-    """Resolve and link; print the warnings."""
     from rendergraph.session import stages
 
     found = stages.link(stages.resolve(selection))
@@ -352,7 +350,6 @@ def put(text: str, output: Path | None, *, as_json: bool = False) -> None:
 
 
 def write(text: str, output: Path) -> None:
-    """Write text to a file, whole or not at all."""
     from rendergraph.images import check_target
     from rendergraph.images.files import write_file
 

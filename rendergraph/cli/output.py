@@ -42,7 +42,6 @@ def data_stream() -> TextIO | None:
 
 
 def emit(text: str) -> None:
-    """Print data to stdout, with one line end."""
     stream = data_stream()
     if stream is not None:
         stream.write(_printable(text, stream) + "\n")
@@ -100,7 +99,6 @@ def _write(text: str) -> None:
 
 
 def warn(problems: Sequence[Problem]) -> None:
-    """Print warnings, each once."""
     Warnings().say(problems)
 
 
@@ -111,7 +109,6 @@ class Warnings:
         self._printed: set[tuple[str, str, str | Place | None]] = set()
 
     def say(self, problems: Sequence[Problem]) -> None:
-        """Print warnings that were not printed before."""
         for problem in problems:
             setting = problem.place.option("--set") if problem.place else None
             key = problem.code, problem.message, setting.path if setting else problem.place
@@ -147,7 +144,6 @@ def print_error(problems: Sequence[Problem], exit_code: int, *, as_json: bool) -
 
 
 def error_document(problems: Sequence[Problem], exit_code: int) -> dict[str, Any]:
-    """Return what `--json` prints under `error`."""
     return {"exit_code": exit_code, "problems": [problem.as_json() for problem in problems]}
 
 
@@ -195,7 +191,6 @@ def section(
 
 
 def sections(*parts: str) -> str:
-    """Return the parts that are not empty, with an empty line between them."""
     return "\n\n".join(filter(None, parts))
 
 

@@ -16,7 +16,6 @@ _STORED_BLOCKS = "a crash of this driver is avoided: more than two uniform block
 
 
 def libraries() -> dict[str, str | None]:
-    """Return shared libraries with the loader's error message, None where one loads."""
     found: dict[str, str | None] = {}
     for name in ("libEGL.so.1", "libGL.so.1"):
         try:
@@ -28,7 +27,6 @@ def libraries() -> dict[str, str | None]:
 
 
 def context(index: int) -> dict[str, Any]:
-    """Return version, features and limits of a device's OpenGL."""
     from rendergraph.gl.device import open_device
 
     device = open_device(index)

@@ -45,7 +45,6 @@ NEEDLESS = {
 
 
 def unknown_option(error: click.NoSuchOption, context: click.Context) -> str:
-    """Return the message about an option that the verb of a context does not have."""
     name = error.option_name
     if not name.startswith("--"):  # click found only the first letter of `-width`
         name = next((word for word in context.obj or () if word.startswith(name)), name)

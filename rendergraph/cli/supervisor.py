@@ -42,7 +42,6 @@ def supervise() -> None:
 
 
 def _wait(worker: int, ending: AbstractSet[int]) -> int:
-    """Wait for the worker's end, and return the exit code."""
     signalled, deadline = 0, time.monotonic() + 1e9
     while True:
         found = signal.sigtimedwait({*ending, signal.SIGCHLD}, max(0.0, deadline - time.monotonic()))

@@ -190,7 +190,6 @@ def command(
 
 
 def _write_files(found: Sweep, out: Path, *, title: str, note: str, as_csv: bool) -> dict[str, Path]:
-    """Write chart, report and table into the folder of a sweep, and return their paths."""
     from rendergraph.compare.export.table import csv_text
     from rendergraph.compare.report import quality_svg, sweep_page
 

@@ -1,9 +1,16 @@
-"""`run --watch`: reports while pictures follow their files."""
+"""`run --watch`: render again whenever an input file of the picture changes, and report it.
+
+Files are polled (`stamps`): a few dozen `stat` calls ten times a second cost nothing measurable, work on every file
+system, network and container included, and follow a file that an editor replaces by another of its name. Files that the
+last attempt looked for in vain are watched, too, such as a missing include.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -12,22 +19,98 @@ from rendergraph.cli.app import unexpected
 from rendergraph.cli.output import data_stream, emit_json, error_document, say, say_summary, warn
 from rendergraph.errors import InputError, RenderError, RendergraphError
 from rendergraph.resources import folder
+from rendergraph.stamps import Stamps, modified, stamp, track_reads
 
 if TYPE_CHECKING:
     from rendergraph.session.gpu import Gpu
-    from rendergraph.session.watch import Turn
 
 Draw: TypeAlias = "Callable[[Gpu], dict[str, Any]]"
 """Reads, renders and writes everything; returns the document of `run --json`."""
 
+INTERVAL = 0.1
+"""Seconds between two checks."""
+REST = 0.05
+"""Seconds for which a file must be unchanged before it is read: editors write in several steps."""
+PATIENCE = 1.0
+"""Seconds to wait for a file that has vanished or keeps changing."""
 _SHIPPED = ("rendergraph.pipelines", "rendergraph.shaders", "rendergraph.nodes")
 _MOST_NAMES = 3
+
+
+@dataclass(frozen=True)
+class Turn:
+    """One attempt to render.
+
+    Attributes:
+        value: the returned value; None if it failed.
+        error: why it failed.
+        changed: the files that caused it; none the first time.
+        ms: milliseconds from noticing the change until everything was rendered and written.
+        made: number of `programs`, `textures` and `scenes` that were created.
+        files: the files that it looked for, which are watched now.
+    """
+
+    value: dict[str, Any] | None
+    error: RendergraphError | None
+    changed: tuple[Path, ...]
+    ms: float
+    made: Mapping[str, int]
+    files: Stamps
+
+
+def turns(draw: Draw, gpu: Gpu) -> Iterator[Turn]:
+    """Render, and again after every change of an input file; yield every attempt, without end.
+
+    `draw` starts from reading the pipeline; what has not changed comes from the caches of `gpu`. A mistake is an
+    attempt, too, and the next change may fix it.
+    """
+    seen: tuple[Path, ...] = ()
+    while True:
+        start, before = time.perf_counter(), _made(gpu)
+        value, error = None, None
+        with track_reads() as files:
+            try:
+                value = draw(gpu)
+            except RendergraphError as problem:
+                error = problem
+        made = {name: count - before[name] for name, count in _made(gpu).items()}
+        yield Turn(value, error, seen, (time.perf_counter() - start) * 1e3, made, files)
+        seen = tuple(wait(files))
+
+
+def wait(files: Stamps) -> list[Path]:
+    """Block until a file has changed and is stable again, and return which.
+
+    A file that has vanished is given a moment to return: many editors write by renaming.
+    """
+    while True:
+        found = modified(files)
+        if found:
+            _settle(found)
+            if found := modified(files):  # it may be back, just as it was
+                return found
+        time.sleep(INTERVAL)
+
+
+def _settle(paths: list[Path]) -> None:
+    end = time.monotonic() + PATIENCE
+    before = [stamp(path) for path in paths]
+    while time.monotonic() < end:
+        time.sleep(REST)
+        now = [stamp(path) for path in paths]
+        if now == before and None not in now:
+            return
+        before = now
+
+
+def _made(gpu: Gpu) -> dict[str, int]:
+    cache = gpu.cache
+    return {"programs": cache.programs.compiled, "textures": gpu.device.textures_made, "scenes": cache.scenes_made}
 
 
 def watch_and_render(draw: Draw, device: int | None, *, as_json: bool) -> None:
     """Render now and after every change; raises where the first picture fails and no edit of a file could fix it."""
     from rendergraph.session.gpu import Gpu
-    from rendergraph.session.watch import turns
 
     reported: tuple[str, ...] = ()
     with Gpu(device) as gpu:
@@ -63,7 +146,7 @@ def _attempt(draw: Draw, gpu: Gpu) -> dict[str, Any]:
         raise RenderError(unexpected(error)) from error
 
 
-def _is_fixable(error: RendergraphError, turn: Turn[Any]) -> bool:
+def _is_fixable(error: RendergraphError, turn: Turn) -> bool:
     """Return whether a file of the user's is involved: a misspelt name on the command line ends the program instead."""
     shipped = [folder(package) for package in _SHIPPED]
     existing = [Path(name) for name, found in turn.files.items() if found is not None]
@@ -80,7 +163,7 @@ def _report_error(error: RendergraphError, changed: tuple[Path, ...], before: tu
     return now
 
 
-def _line(turn: Turn[Any]) -> str:
+def _line(turn: Turn) -> str:
     rebuilt = [f"{count} {name if count != 1 else name[:-1]}" for name, count in turn.made.items() if count]
     frame_ms = (turn.value or {})["frame_ms"]["median"]
     what = f"rebuilt {', '.join(rebuilt)}" if rebuilt else "nothing rebuilt"
@@ -93,7 +176,7 @@ def _names(paths: tuple[Path, ...]) -> str:
     return ", ".join(names[:_MOST_NAMES]) + more
 
 
-def _document(turn: Turn[Any]) -> dict[str, Any]:
+def _document(turn: Turn) -> dict[str, Any]:
     about = {"changed": [str(path) for path in turn.changed], "ms": turn.ms, "made": dict(turn.made)}
     if turn.error is not None:
         return about | {"error": error_document(turn.error.problems, turn.error.exit_code)}

@@ -141,7 +141,6 @@ def measure_batch(
 
 
 def node_types(planned: Planned) -> dict[str, str]:
-    """Return each node's id to the name of its type."""
     return {node.id: node.type.name for node in planned.linked.graph.nodes}
 
 

@@ -66,7 +66,6 @@ class Sweep:
         return self.comparison._repr_html_()
 
     def as_json(self) -> dict[str, Any]:
-        """Return the document of `sweep --json`."""
         document = self.comparison.as_json()
         runs = document.pop("variants")
         front = {result.name for result in pareto(self.comparison.results)}
@@ -250,7 +249,6 @@ def compare_pictures(
 
 
 def _read_like(path: Path, reference: Reference) -> Any:
-    """Read a picture that can be compared with the reference."""
     pixels, encoding = read_picture(path)
     check_sizes(pixels, reference.pixels, (str(path), reference.name))
     if encoding != reference.encoding:

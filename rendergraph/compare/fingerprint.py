@@ -100,7 +100,6 @@ def _code(graph: Graph) -> Iterator[str]:
 
 
 def _module_digests(name: str, seen: set[str]) -> Iterator[str]:
-    """Yield the digests of a module and of all that it imports from its own package."""
     package = _BUILTIN if name.startswith(f"{_BUILTIN}.") else name.partition(".")[0]
     waiting = [name]
     while waiting:

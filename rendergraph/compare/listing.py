@@ -88,6 +88,5 @@ def list_sweep(
 
 
 def is_complete(run: Run, lines: Mapping[str, dict[str, Any]], options: SweepOptions) -> bool:
-    """Whether a run is rendered and measured; `lines` are those of the results, by key."""
     record = find_record(run, lines, pictures=options.kept == "all")
     return record is not None and bool(record.frames) and record.times.covers(options.frames, options.repeats)

@@ -66,8 +66,6 @@ class _Dimension:
 
 
 class _Optimiser:
-    """Optuna's study, and the results of all runs that it asked for."""
-
     def __init__(self, space: Space, objectives: Sequence[str], seed: int) -> None:
         import optuna  # an extra
 

@@ -253,7 +253,6 @@ class Comparison:
         return bool(self.device.get("software"))
 
     def as_json(self) -> dict[str, Any]:
-        """Return the document of `compare --json`."""
         return {
             "reference": self.reference.as_json(),
             "scene": self.scene,
@@ -289,7 +288,6 @@ def measure_against(
 
 
 def light_error(light: Pixels | None, reference: Pixels | None) -> float | None:
-    """Return the RMSE of scene-linear light, None where either picture has none."""
     if light is None or reference is None:
         return None
     return metrics.rmse(metrics.colors(light), metrics.colors(reference))
@@ -363,7 +361,6 @@ class Search:
         return {"minimise": list(self.minimise), "budget": self.budget, "asked": asked, "front": list(self.front)}
 
     def improvements(self) -> list[tuple[int, float]]:
-        """Return after how many runs the first objective improved, and its new value."""
         steps: list[tuple[int, float]] = []
         for number, name in enumerate(self.order, 1):
             values = self.values.get(name) if name is not None else None

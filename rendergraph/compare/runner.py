@@ -43,11 +43,9 @@ class Runner:
 
     @property
     def missing(self) -> list[int]:
-        """Numbers of the runs that are neither complete nor failed."""
         return [number for number in range(len(self.prepared.runs)) if number not in self.results]
 
     def execute(self, farm: Executor, progress: Callable[[int, int], None]) -> None:
-        """Render and measure all runs that are missing."""
         self._waiting = self._groups(self.missing, farm.workers)
         if self.reference is not None:
             self._distribute(farm, self.reference)
@@ -111,7 +109,6 @@ class Runner:
         }
 
     def _distribute(self, farm: Executor, reference: Reference) -> None:
-        """Submit everything that waits for the reference."""
         self.reference = reference
         self._handle = farm.put(reference)
         waiting, self._waiting = self._waiting, []
@@ -275,7 +272,6 @@ class SweepRunner(Runner):
         self._completed += 1
 
     def _report(self, event: str, worker: str, **more: Any) -> None:
-        """Report an event, with the speed and the remaining time."""
         if self.options.events is None:
             return
         seconds, left, total = time.monotonic() - self._begun, len(self.missing), len(self.prepared.runs)

@@ -98,7 +98,6 @@ class Axis:
 
     @property
     def text(self) -> str:
-        """The values as `-x` takes them."""
         return self.written or ",".join(self.values)
 
     def at(self, position: Position) -> str:
@@ -349,7 +348,6 @@ def typed(text: str) -> Any:
 
 
 def repeated(values: Iterable[str]) -> list[str]:
-    """Return the values that occur more than once."""
     return [value for value, count in Counter(values).items() if count > 1]
 
 

@@ -128,15 +128,12 @@ def line_schema() -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Failure:
-    """A run that could not be rendered or compared, and the reasons."""
-
     name: str
     settings: Mapping[str, str]
     problems: tuple[Problem, ...]
 
     @property
     def text(self) -> str:
-        """The reasons, one a line."""
         return "\n".join(str(problem).splitlines()[0] for problem in self.problems)
 
     def as_json(self) -> dict[str, Any]:
@@ -161,7 +158,6 @@ class ResultsLog:
         return [record for record in records if record is not None], sum(record is None for record in records)
 
     def by_key(self) -> tuple[dict[str, dict[str, Any]], int]:
-        """Return the last record of each key, and the number of incomplete lines."""
         records, incomplete = self.read()
         return {record["key"]: record for record in records if "key" in record}, incomplete
 
@@ -190,7 +186,6 @@ class ResultsLog:
 
 
 def checksum(record: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of a record without its checksum."""
     rest = {key: value for key, value in record.items() if key != CHECKSUM}
     text = json.dumps(rest, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()
@@ -384,7 +379,6 @@ def kept_runs(out: Path) -> int:
 
 
 def _first_change(old: Any, new: Any, path: str = "") -> str:
-    """Describe the first value that differs between two resolved files."""
     if isinstance(old, dict) and isinstance(new, dict):
         for key in [*old, *(key for key in new if key not in old)]:
             if old.get(key) != new.get(key):

@@ -144,7 +144,6 @@ _OPTIONS = {"metric": "metric", "frames": "frames", "repeats": "repeats", "keep"
 
 
 def value_text(value: Value) -> str:
-    """Return the text that `-s` takes for a value."""
     plain = value.plain()
     return plain if isinstance(plain, str) else json.dumps(plain)
 

@@ -1,4 +1,7 @@
-"""Tasks that any worker can do: render variants, compare them with the reference, and measure them."""
+"""Tasks that any worker can do: render variants, compare them with the reference, and measure them.
+
+`first_difference` finds the first pass, in order of execution, whose output differs between two pipelines.
+"""
 
 from __future__ import annotations
 
@@ -6,30 +9,37 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+import numpy as np
+
 from rendergraph.compare.batches import Batch, fitting_batches, measure_batch, node_types, render_batch
-from rendergraph.compare.divergence import every_output, first_difference
 from rendergraph.compare.prepare import Run
 from rendergraph.compare.results import (
+    Difference,
     Pixels,
     Reference,
     light_error,
     machine,
     measure_against,
     not_finite_pixels,
+    passes,
 )
 from rendergraph.compare.timing import Times, times_of
-from rendergraph.diff import diff
+from rendergraph.declare import InOut, Output
+from rendergraph.diff import GraphDiff, diff
 from rendergraph.errors import InputError, Problem, RenderError
 from rendergraph.farm import Handle, Task, Worker
 from rendergraph.farm.bundle import map_remote_paths
 from rendergraph.farm.tasks import is_retryable
+from rendergraph.link import Endpoint, Graph
 from rendergraph.metrics import Encoding
-from rendergraph.session import stages
+from rendergraph.session import RenderOptions, stages
 from rendergraph.session.frame import figures_of
 
 if TYPE_CHECKING:
+    from rendergraph.allocate import ResourcePlan
     from rendergraph.execute import FrameTimes
     from rendergraph.link import Graph
+    from rendergraph.session import Frame
     from rendergraph.session.gpu import Gpu
     from rendergraph.session.values import Planned
 
@@ -41,8 +51,6 @@ FRAMES_PER_TURN = 2
 
 @dataclass(frozen=True, eq=False)
 class ReferenceResult:
-    """The reference has been rendered."""
-
     reference: Reference
     origin: Origin
 
@@ -60,8 +68,6 @@ class RenderedResult:
 
 @dataclass(frozen=True, eq=False)
 class TimingResult:
-    """A run has been measured."""
-
     number: int
     times: Times
     origin: Origin
@@ -77,8 +83,6 @@ class TaskError:
 
 @dataclass(frozen=True)
 class PassCount:
-    """This many passes have been executed for a batch."""
-
     count: int
 
 
@@ -193,8 +197,6 @@ class ComparisonTask(VariantTask):
 
 @dataclass(frozen=True, eq=False)
 class ReferenceTask(Task):
-    """The reference, where it is not one of the runs that are rendered."""
-
     name: str
     base: Run
     kind: Literal["variant", "pipeline"]
@@ -242,7 +244,6 @@ def _rendered(
 
 
 def _encoded(run: Run, graph: Graph, pixels: Pixels) -> bytes:
-    """Return the file of a run's picture."""
     from rendergraph.images import PictureInfo, Saved, encoded  # a sweep is checked without OpenImageIO
 
     info = graph.textures[graph.outputs[run.output]]
@@ -272,3 +273,74 @@ def _mapped(error: InputError | RenderError, worker: Worker) -> InputError | Ren
     mapped = map_remote_paths(error, worker.root)
     assert isinstance(mapped, InputError | RenderError)  # of the same class
     return mapped
+
+
+def every_output(gpu: Gpu, planned: Planned, frame: int) -> Frame:
+    """Render a frame with every texture that a pass hands to others."""
+    ports = taps(planned.linked.graph, planned.plan)
+    options = RenderOptions(frames=range(1, frame + 1), outputs=(), taps=tuple(ports))
+    return stages.draw_last(stages.expand(planned.linked, options), gpu)
+
+
+def taps(graph: Graph, plan: ResourcePlan) -> list[str]:
+    """Return the ports, in order of execution, whose texture another node or an output of the graph reads."""
+    read = {Endpoint(end.node, end.port) for node in graph.nodes for ends in node.inputs.values() for end in ends}
+    read |= set(graph.outputs.values())
+    ports = []
+    for node in passes(plan):
+        for name, port in graph[node].node.outputs().items():
+            info = graph.textures.get(Endpoint(node, name))
+            desc = info.desc if info is not None else None
+            if isinstance(port, Output | InOut) and desc is not None and desc.layers and desc.samples == 1:
+                ports += [f"{node}.{name}"] if Endpoint(node, name) in read else []
+    return ports
+
+
+def first_difference(
+    base: Frame, variant: Frame, plan: ResourcePlan, graph: Graph, difference: GraphDiff
+) -> Difference | None:
+    """Return the first pass of the variant that has a counterpart in the base and another output, bit by bit.
+
+    A pass that only one of the two has is not a difference by itself: the passes that read it show whether it matters.
+    The frames are from `every_output`; plan and graph are the variant's.
+    """
+    counterparts = {new: old for old, new in difference.nodes.items()}
+    for node in passes(plan):
+        if node not in counterparts:
+            continue
+        for port in graph[node].node.outputs():
+            a, b = base.get(f"{counterparts[node]}.{port}"), variant.get(f"{node}.{port}")
+            if a is None or b is None or _same(a, b):
+                continue
+            most, share = _amount(a, b)
+            semantic = variant.info(f"{node}.{port}").semantic
+            causes = _causes(graph, node, difference)
+            added = tuple(cause for cause in causes if cause in difference.added)
+            return Difference(node, counterparts[node], port, most, share, causes, added, (a, b), semantic)
+    return None
+
+
+def _same(a: Pixels, b: Pixels) -> bool:
+    if a.shape != b.shape or a.dtype != b.dtype:
+        return False
+    return np.array_equal(a, b, equal_nan=bool(np.issubdtype(a.dtype, np.floating)))
+
+
+def _amount(a: Pixels, b: Pixels) -> tuple[float | None, float]:
+    if a.shape != b.shape:
+        return None, 1.0
+    differ = (a != b) & ~((a != a) & (b != b))  # NaN is the one value that differs from itself
+    texels = differ.any(axis=-1)
+    distance = np.abs(a.astype(np.float64) - b.astype(np.float64))[differ]
+    if a.dtype == np.uint8:
+        distance = distance / 255
+    return (float(distance.max()) if distance.size else 0.0), float(texels.mean())
+
+
+def _causes(graph: Graph, node: str, difference: GraphDiff) -> tuple[str, ...]:
+    """Return the nodes that differ in structure among a pass and everything it reads."""
+    import networkx as nx  # needed for a difference alone, and slow to import
+
+    changed: Mapping[str, object] = difference.changed()
+    leading = {node, *nx.ancestors(graph.dag, node)}
+    return tuple(n.id for n in graph.nodes if n.id in leading and (n.id in changed or n.id in difference.added))

@@ -66,11 +66,9 @@ class Times(Struct, frozen=True):
 
     @property
     def repeated(self) -> Spread | None:
-        """The spread of the repeats; None for fewer than two."""
         return Spread.of(self.repeats) if len(self.repeats) > 1 else None
 
     def covers(self, frames: int, repeats: int) -> bool:
-        """Whether at least this many frames were measured, at least this often."""
         return self.frames >= frames * repeats and max(1, len(self.repeats)) >= repeats
 
 

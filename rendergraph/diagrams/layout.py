@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
-from rendergraph.diagrams.cards import Link
+from rendergraph.diagrams.markup import Link
 
 SWEEPS = 8
 GAP = 26.0  # between boxes of a column

@@ -8,8 +8,8 @@ from html import escape
 from msgspec import Struct
 from msgspec.structs import replace
 
-from rendergraph.diagrams.cards import Card, Link, Socket, cards, links
 from rendergraph.diagrams.layout import LANE, Box, layers_of, place, tie
+from rendergraph.diagrams.markup import Card, Link, Socket, cards, links
 from rendergraph.link import Endpoint, Graph
 
 ROW, HEAD, PAD, RADIUS = 20.0, 40.0, 12.0, 4.0
@@ -63,12 +63,10 @@ class Trunk(Struct):
 
 
 def sheet(graph: Graph) -> Sheet:
-    """Return all of a graph."""
     return Sheet(graph.name, cards(graph), links(graph), graph.outputs)
 
 
 def svg(graph: Graph) -> str:
-    """Return the graph as a stand-alone SVG document, left to right, for light and dark pages."""
     return draw(sheet(graph))
 
 
@@ -84,8 +82,6 @@ def draw(content: Sheet, marks: Mapping[str, Mark] = {}, highlights: Mapping[Lin
 
 
 class _Picture:
-    """The layout of a sheet."""
-
     def __init__(self, content: Sheet, marks: Mapping[str, Mark], highlights: Mapping[Link, str]) -> None:
         self.title, self.marks, self.highlights = content.title, marks, highlights
         self.cards = {
@@ -255,7 +251,6 @@ def _stroke(title: str, path: str, color: str, extra: str) -> str:
 
 
 def _pill(card: Card, x: float, y: float) -> str:
-    """An output of the pipeline."""
     return (
         f'<rect class="card" x="{x:.1f}" y="{y:.1f}" width="{_width(card):.1f}" height="26" rx="13"/>'
         + _dot(x, y + 13, card.inputs[0])

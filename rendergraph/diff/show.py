@@ -70,7 +70,6 @@ def _plan_text(a: PlanFigures, b: PlanFigures) -> str:
 
 
 def diff_json(difference: GraphDiff, plans: Plans | None = None) -> dict[str, Any]:
-    """Return the difference as plain JSON values."""
     fields = asdict(difference)
     a, b = fields.pop("names")
     del fields["nodes"]

@@ -232,8 +232,6 @@ def _outputs(a: Graph, b: Graph, nodes: Mapping[str, str]) -> list[OutputChange]
 
 
 class PlanFigures(Struct, frozen=True):
-    """The cost of a plan."""
-
     passes: int  # nodes that are drawn
     steps: int
     allocated_bytes: int  # of textures and buffers

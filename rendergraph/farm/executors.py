@@ -87,7 +87,6 @@ def cores() -> int:
 
 
 def _machine(device: int | None, devices: Sequence[int]) -> tuple[int, tuple[int | None, ...]]:
-    """Return how many processes this machine takes, and the devices they share."""
     if devices:
         return len(devices), tuple(devices)
     if device is not None:

@@ -59,7 +59,6 @@ class Worker:
 
     @property
     def gpu(self) -> Gpu:
-        """The GL context, opened at first use."""
         if self._gpu is None:
             from rendergraph.session.gpu import opened  # a process that only sends tasks needs no GL
 
@@ -127,6 +126,7 @@ class Executor(AbstractContextManager["Executor"], ABC):
     @abstractmethod
     def submit(self, task: Task) -> None:
         """Add a task; also while events are taken."""
+        pass
 
     @abstractmethod
     def events(self) -> Iterator[Event]:
@@ -137,7 +137,7 @@ class Executor(AbstractContextManager["Executor"], ABC):
 
     @abstractmethod
     def close(self) -> None:
-        pass
+        """End all running tasks."""
 
     @abstractmethod
     def put(self, value: Any) -> Handle:

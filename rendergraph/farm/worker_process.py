@@ -94,7 +94,6 @@ class ChildProcess:
         return f"exit code {code}"
 
     def kill(self) -> None:
-        """End it at once, with all processes that it started."""
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait()

@@ -33,7 +33,6 @@ def kind_of(topic: str) -> Literal["pipeline", "scene"] | None:
 
 
 def describe_pipeline(name: str, linked: Linked) -> dict[str, Any]:
-    """Return what a pipeline is made of."""
     path, graph, spec = linked.spec.path, linked.graph, linked.spec
     assert path is not None  # it was named by a file
     return {
@@ -54,7 +53,6 @@ def describe_pipeline(name: str, linked: Linked) -> dict[str, Any]:
 
 
 def describe_scene(name: str, path: Path, scene: Scene) -> dict[str, Any]:
-    """Return what a scene file has, and what is added where it has none."""
     from rendergraph.scene.animate import complete  # other topics need no scene
 
     triangles = [mesh.indices.size // 3 for mesh in scene.meshes]

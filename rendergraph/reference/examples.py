@@ -76,7 +76,6 @@ def _bases() -> tuple[Graph, ...]:
 
 
 def _linked(text: str, catalog: Catalog) -> Graph | None:
-    """The graph of a pipeline file; None where it has a mistake."""
     try:
         return link(resolve(parse(text, "example.yaml"), catalog=catalog), catalog, _LIGHTS)
     except InputError:
@@ -144,7 +143,6 @@ def _best_end(base: Graph, name: str, port: Input | InOut) -> str | None:
 
 
 def _ends(base: Graph) -> Iterator[tuple[Endpoint, str, str]]:
-    """Every output of a graph, its kind and its meaning."""
     for node in base.nodes:
         for name, port in node.type.cls.outputs().items():
             end = Endpoint(node.id, name)

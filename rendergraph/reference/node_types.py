@@ -15,7 +15,6 @@ _COMPUTED = "computed"
 
 
 def summary(node_type: NodeType) -> str:
-    """Return the first line of the docstring."""
     return (inspect.getdoc(node_type.cls) or "").partition("\n")[0]
 
 
@@ -175,7 +174,6 @@ def input_facts(port: dict[str, Any]) -> list[str]:
 
 
 def output_facts(port: dict[str, Any]) -> list[str]:
-    """Return how an output or internal texture is allocated."""
     sizes = [
         f"{key} computed" if port[key] == _COMPUTED else str(port[key]) for key in ("format", "size") if key in port
     ]

@@ -35,7 +35,6 @@ def table_of(kind: str) -> Table:
 
 
 def file_keys(kind: str) -> list[dict[str, Any]]:
-    """Return every key of a kind of file, section by section."""
     from rendergraph.keys import brief  # most topics need no keys
 
     return [

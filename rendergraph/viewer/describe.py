@@ -97,7 +97,6 @@ def _parameter(parameter: Parameter, value: Any, added: tuple[str, ...]) -> dict
 
 
 def _kind(value: Any) -> str:
-    """Return the kind of input field for a value."""
     kinds: tuple[tuple[type, str], ...] = ((bool, "boolean"), (int, "integer"), (float, "number"), (str, "text"))
     return next((name for kind, name in kinds if isinstance(value, kind)), "json")
 

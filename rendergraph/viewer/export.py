@@ -23,7 +23,6 @@ _LIST = re.compile(r"^export \{ ([\w, ]+) \};$", re.MULTILINE)
 
 
 def export_page(state: ViewState, gpu: Gpu) -> str:
-    """Return the page with everything in it, as HTML."""
     service = RenderService(gpu)
     picture = _ask(service, state.request())
     state.record(picture)

@@ -35,6 +35,8 @@ class RenderRequest:
 class ThumbnailRequest:
     """A small picture of every port of the last frame."""
 
+    pass
+
 
 @dataclass(frozen=True)
 class PixelRequest:
@@ -46,21 +48,19 @@ class PixelRequest:
 
 @dataclass(frozen=True)
 class CompareRequest:
-    """Another pipeline rendered the same way, and how much the picture differs from it."""
-
     selection: Selection
 
 
 @dataclass(frozen=True)
 class VariantRequest:
-    """The YAML of what differs from the file that was opened."""
-
     opened: Selection
 
 
 @dataclass(frozen=True)
 class ChangedFilesRequest:
     """The input files of the picture that have changed."""
+
+    pass
 
 
 Request = RenderRequest | ThumbnailRequest | PixelRequest | CompareRequest | VariantRequest | ChangedFilesRequest

@@ -309,7 +309,6 @@ def _store(cache: dict[Any, Any], key: Any, value: Any) -> None:
 
 
 def _expose(pixels: Pixels, info: OutputInfo, exposure: float) -> Pixels:
-    """Return light at an exposure in EV; anything else as it is."""
     return pixels * np.float32(2.0**exposure) if exposure and info.semantic in _LIGHT else pixels
 
 

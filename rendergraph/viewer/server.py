@@ -160,7 +160,6 @@ class Server:
         self._uvicorn.run(sockets=[self._socket])
 
     def start(self) -> Callable[[], None]:
-        """Serve in a thread of its own, and return a function that stops it."""
         thread = threading.Thread(target=self.run, name="rendergraph view", daemon=True)
         thread.start()
 

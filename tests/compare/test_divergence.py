@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 import rendergraph as rg
-from rendergraph.compare.divergence import every_output, first_difference, taps
 from rendergraph.compare.results import Difference, passes
+from rendergraph.compare.tasks import every_output, first_difference, taps
 from rendergraph.diff import diff
 
 

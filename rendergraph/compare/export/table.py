@@ -24,7 +24,6 @@ class Column:
     unit: str = ""
 
     def field(self, **more: Any) -> dict[str, Any]:
-        """Return the field of the Table Schema."""
         doc = f"{self.doc.rstrip('.')}, in {self.unit}." if self.unit else self.doc
         return {"name": self.name, "type": self.type, "description": doc, **more}
 

@@ -25,7 +25,6 @@ def software_note(software: bool) -> str:
 
 
 def png(pixels: npt.NDArray[np.uint8]) -> str:
-    """Return a picture as a data URL."""
     data = picture_bytes((Path("picture.png"), pixels, None, "data", False), {})
     return "data:image/png;base64," + base64.b64encode(data).decode()
 
@@ -89,8 +88,6 @@ def card(entries: Iterable[tuple[str, object]]) -> str:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page with a title; one without a body is left out."""
-
     identity: str
     title: str
     body: str

@@ -16,7 +16,6 @@ def _pictures(comparison: Comparison) -> list[tuple[str, str]]:
 
 
 def viewer(comparison: Comparison) -> str:
-    """Return two of the page's pictures under a slider."""
     pictures = _pictures(comparison)
 
     def options(chosen: int) -> str:
@@ -83,7 +82,6 @@ def _figure(identity: str, source: str, caption: str) -> str:
 
 
 def first_differences(comparison: Comparison) -> str:
-    """Return the first pass of each variant whose output differs, with both textures."""
     parts = []
     base = comparison.base[0] if comparison.base else ""
     for result in comparison.results:

@@ -92,8 +92,6 @@ def scatter_svg(points: Sequence[Point], time: str, error: str) -> str:
 
 @dataclass(frozen=True)
 class _Spot:
-    """An occupied rectangle, one label high."""
-
     left: float
     right: float
     y: float
@@ -103,7 +101,6 @@ class _Spot:
 
 
 def _label(text: str, x: float, y: float, taken: list[_Spot]) -> str:
-    """Return the text beside a point, or nothing if there is no room."""
     width = 6.8 * len(text)
     for shift in (0, -14, 14, -28, 28, -42, 42):
         for left in (x + 10, x - width - 10):
@@ -129,7 +126,6 @@ def _plain(value: float) -> str:
 
 
 def _ceiling(value: float) -> float:
-    """Return the next round number, so that ticks are round."""
     if not value > 0 or not math.isfinite(value):
         return 1.0
     power = 10.0 ** math.floor(math.log10(value))
