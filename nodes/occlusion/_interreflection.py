@@ -1,4 +1,4 @@
-"""What the techniques share that gather light from other surfaces of the picture."""
+"""Shared by techniques that gather light from other surfaces in the picture."""
 
 from __future__ import annotations
 
@@ -19,50 +19,54 @@ from rendergraph.api import (
 )
 
 from ..geometry._surface_textures import AlbedoRoot
-from ._arms import ArmOcclusion
+from ._directional import DirectionalSampling
 
 
-class Interreflection(ArmOcclusion):
-    """Base of the techniques that add what surfaces send one another to a lit picture.
+class Interreflection(DirectionalSampling):
+    """Base of the techniques that add diffuse interreflection to a lit picture.
 
-    One bounce: light that came from `diffuse` and is sent on by the surface it reaches. A second node of the kind,
-    which takes the first one's `reflected` for its `diffuse` and continues its `radiance`, is the second bounce.
+    One bounce: light leaves surfaces as `diffuse`, and is reflected by the surfaces it reaches. For a second bounce, a
+    second node takes the `reflected` of the first as its `diffuse`, and continues its `radiance`.
     """
 
     depth = Input(Depth, group="gbuffer", doc="Window depth; positions come from it and its view.")
     normal = Input(Normal, group="gbuffer", doc="Unit normal, world space.")
-    albedo = Input(AlbedoRoot, group="gbuffer", doc="Root of the base colour: what a surface sends on of each colour.")
+    albedo = Input(AlbedoRoot, group="gbuffer", doc="Square root of the base colour, which is the diffuse reflectance.")
     material = Input(
-        Material, group="gbuffer", optional=True, doc="Metal sends no diffuse light on. Unconnected: nothing is metal."
+        Material, group="gbuffer", optional=True, doc="Metal reflects no diffuse light. Unconnected: nothing is metal."
     )
-    diffuse = Input(Radiance, doc="Radiance that surfaces send to all sides, without its specular part.")
-    radiance = InOut(Radiance, doc="The lit picture; what surfaces send on is added.")
+    diffuse = Input(Radiance, doc="Diffuse radiance that leaves surfaces.")
+    radiance = InOut(Radiance, doc="The lit picture, to which reflected light is added.")
     indirect = Output(
         Radiance,
         format="rgba16f",
         size="depth",
-        doc="Light from other surfaces, irradiance over π: what a white surface would send on.",
+        doc="Irradiance from other surfaces, over π: what a white surface would reflect.",
     )
     reflected = Output(
-        Radiance, format="rgba16f", size="depth", doc="What surfaces send on of it: `diffuse` of the next bounce."
+        Radiance, format="rgba16f", size="depth", doc="Light that surfaces reflect of it: `diffuse` of the next bounce."
     )
 
     denoise: int = structural(
-        default=3, min=0, max=5, doc="Passes of a filter over light on the same surface; each reaches twice as far."
+        default=3,
+        min=0,
+        max=5,
+        doc="Passes of a filter over light on the same surface; each reaches twice as far as the one before.",
     )
 
-    def send_on(self, steps: Steps, **more: Any) -> None:
-        """What surfaces make of `indirect`, alone and added to the picture.
+    def reflect_indirect(self, steps: Steps, **options: Any) -> None:
+        """Record the reflection of `indirect`, by itself and added to the picture.
 
         Args:
-            steps: what records it.
-            more: further arguments of the step that adds it.
+            steps: the recorder.
+            options: further arguments of the step that adds it.
         """
         reads: dict[str, Any] = {"indirect": self.indirect, "albedo": self.albedo}
         if steps.connected(self.material):
             reads["material"] = self.material
         if steps.used(self.reflected):
-            steps.fullscreen("send_on.frag", out={"sent": self.reflected}, **reads)
+            steps.fullscreen("reflect_indirect.frag", out={"reflected": self.reflected}, **reads)
         if steps.used(self.radiance):
-            added = State(blend=ADD, color_mask=(True, True, True, False))
-            steps.fullscreen("send_on.frag", out={"sent": self.radiance}, state=added, **reads, **more)
+            additive = State(blend=ADD, color_mask=(True, True, True, False))
+            target = {"reflected": self.radiance}
+            steps.fullscreen("reflect_indirect.frag", out=target, state=additive, **reads, **options)

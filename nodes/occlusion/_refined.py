@@ -1,4 +1,4 @@
-"""What the occlusions share that compute few pixels of a picture and interpolate where those agree."""
+"""Shared by techniques that compute some pixels at a reduced size, and the others at full size."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from ._screen_space import ScreenSpaceOcclusion
 
 
 class RefinedOcclusion(ScreenSpaceOcclusion):
-    """Base of the techniques that work at two sizes: reduced, and the picture's own where that does not do.
+    """Base of the techniques that work at two sizes: a reduced one, and full size where that is not enough.
 
     Dual-resolution occlusion (Bavoil and Sainz, "Multi-Layer Dual-Resolution Screen-Space Ambient Occlusion", 2009).
-    Reduced pixels look at the surfaces of the whole picture. A pixel of the picture takes the mean of the four around
-    it that lie on its own surface; where none does, or they say too little, it is marked, and the technique's passes
-    are drawn once more over what is marked. The marks are a depth: its test leaves out blocks of pixels before a shader
-    begins.
+    Reduced pixels sample the surfaces at full size. A pixel of the picture is interpolated from the four reduced ones
+    around it that lie on its own surface. Where there is none, or they differ too much, a mask is set, and the
+    technique's passes are drawn again over the mask. The mask is a depth buffer, so that the depth test discards blocks
+    of pixels before the shader runs.
     """
 
-    whole = Internal(format="rgba32f", size="depth", view="depth")
-    marks = Internal(Depth, format="depth16", size="depth")
+    full_surfaces = Internal(format="rgba32f", size="depth", view="depth")
+    refine_mask = Internal(Depth, format="depth16", size="depth")
 
     scale: float = structural(
         default=0.5,
@@ -34,21 +34,21 @@ class RefinedOcclusion(ScreenSpaceOcclusion):
     )
 
     def refines(self, steps: Steps) -> bool:
-        """Whether there are two sizes."""
-        return self.refine and bool(self.sizes(steps))
+        """Return whether there are two sizes."""
+        return self.refine and bool(self.size_defines(steps))
 
     def gather_surfaces(self, steps: Steps) -> None:
-        """Bring normals and distances into `surfaces`, and with two sizes the picture's into `whole` instead."""
+        """Record the pass that writes `surfaces`, or with two sizes `full_surfaces`."""
         if self.refines(steps):
-            steps.fullscreen("surfaces.frag", out={"surfaces": self.whole}, **self.gathered(steps))
+            steps.fullscreen("surfaces.frag", out={"surfaces": self.full_surfaces}, **self.surface_inputs(steps))
         else:
             super().gather_surfaces(steps)
 
     def sparse(self, steps: Steps, defines: Mapping[str, int] | None = None) -> dict[str, Any]:
-        """Arguments of a step over reduced pixels that look at the surfaces of the whole picture."""
+        """Return arguments of a step over reduced pixels that samples the surfaces at full size."""
         return {
-            "surfaces": self.whole,
-            "reduced": steps.desc(self.surfaces).size,
+            "surfaces": self.full_surfaces,
+            "reduced_size": steps.desc(self.surfaces).size,
             "defines": {**(defines or {}), "SPARSE": 1},
         }
 
@@ -60,25 +60,25 @@ class RefinedOcclusion(ScreenSpaceOcclusion):
         out: Mapping[str, Port],
         defines: Mapping[str, int] | None = None,
     ) -> None:
-        """Bring what is reduced to full size, and mark the pixels that it says too little about.
+        """Record the interpolation of a reduced texture, and of the mask of pixels that must be computed.
 
         Args:
-            steps: what records it.
+            steps: the recorder.
             fragment: the shader.
             source: a reduced texture, without noise.
-            out: what is made of it, by the names in `finish.glsl`, and as `found` where the steps put what they filter.
-            defines: what of it there is to make.
+            out: outputs by their names in `outputs.glsl`, and `interpolated`, which later passes filter.
+            defines: macros of the shader.
         """
         steps.fullscreen(
             fragment,
-            out={**out, "marks": self.marks},
+            out={**out, "mask": self.refine_mask},
             state=State(depth_test=False),
             source=source,
-            surfaces=self.whole,
+            surfaces=self.full_surfaces,
             defines={**(defines or {}), "FINAL": 1},
         )
 
-    def over_marked(self, out: Mapping[str, Port]) -> dict[str, Any]:
-        """Arguments of a step over the pixels that `interpolate` has marked."""
+    def masked(self, out: Mapping[str, Port]) -> dict[str, Any]:
+        """Return arguments of a step over the pixels in the mask."""
         state = State(depth_test=True, depth_write=False)
-        return {"out": {**out, "marks": self.marks}, "surfaces": self.whole, "state": state}
+        return {"out": {**out, "mask": self.refine_mask}, "surfaces": self.full_surfaces, "state": state}

@@ -1,4 +1,4 @@
-"""What the nodes share that compute occlusion in image space: their inputs, reduced size, and the way back to full."""
+"""Shared by techniques that compute occlusion in screen space: inputs, reduced size, upsampling."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ def reduced_size(node: Any, facts: Facts) -> tuple[int, int]:
 
 
 class ScreenSpaceOcclusion(Node):
-    """Base of the techniques that see no more of the scene than depth and normals of the picture.
+    """Base of the techniques that know the scene only by depth and normals of the picture.
 
-    `record` calls `gather_surfaces` first, then makes an occlusion at the reduced size, and gives it to `upsample`
-    where that is not the picture's.
+    `record` calls `gather_surfaces` first, then computes occlusion at the reduced size, and passes it to `upsample` if
+    that is not the picture's size.
     """
 
     depth = Input(Depth, doc="Window depth; positions come from it and its view.")
@@ -47,36 +47,37 @@ class ScreenSpaceOcclusion(Node):
         default=1.0, min=0.125, max=1, doc="Share of the picture's width and height it is computed at."
     )
 
-    def screen(self, steps: Steps) -> tuple[int, int]:
-        """The picture's size."""
+    def screen_size(self, steps: Steps) -> tuple[int, int]:
+        """Return the size of the picture."""
         desc = steps.facts.input("depth").desc
         assert desc is not None
         return desc.size
 
-    def sizes(self, steps: Steps) -> dict[str, int]:
-        """The macro that says whether `surfaces` is smaller than the picture."""
-        return {} if steps.desc(self.surfaces).size == self.screen(steps) else {"REDUCED": 1}
+    def size_defines(self, steps: Steps) -> dict[str, int]:
+        """Return the macro `REDUCED` if `surfaces` is smaller than the picture."""
+        return {} if steps.desc(self.surfaces).size == self.screen_size(steps) else {"REDUCED": 1}
 
     def gather_surfaces(self, steps: Steps) -> None:
-        """Bring normals and distances into `surfaces`."""
-        steps.fullscreen("surfaces.frag", out=self.surfaces, defines=self.sizes(steps), **self.gathered(steps))
+        """Record the pass that writes normals and distances to `surfaces`."""
+        defines = self.size_defines(steps)
+        steps.fullscreen("surfaces.frag", out=self.surfaces, defines=defines, **self.surface_inputs(steps))
 
-    def gathered(self, steps: Steps) -> dict[str, Any]:
-        """What surfaces are gathered from."""
-        return {"depth": self.depth, "normal": self.normal, "reduced": steps.desc(self.surfaces).size}
+    def surface_inputs(self, steps: Steps) -> dict[str, Any]:
+        """Return the inputs of `surfaces.frag`."""
+        return {"depth": self.depth, "normal": self.normal, "reduced_size": steps.desc(self.surfaces).size}
 
-    def target(self, steps: Steps, small: Port) -> Port:
-        """Where the last pass at reduced size goes: `occlusion` itself where nothing is reduced, else `small`."""
-        return small if self.sizes(steps) else self.occlusion
+    def reduced_target(self, steps: Steps, reduced: Port) -> Port:
+        """Return the target of the last pass at the reduced size: `reduced`, or `occlusion` at full size."""
+        return reduced if self.size_defines(steps) else self.occlusion
 
     def upsample(self, steps: Steps, source: Port, out: Mapping[str, Port], defines: Mapping[str, int]) -> None:
-        """Bring what is reduced to full size.
+        """Record the upsampling of a reduced texture.
 
         Args:
-            steps: what records it.
+            steps: the recorder.
             source: a reduced texture.
-            out: what is made of it, by the names in `finish.glsl`.
-            defines: what of it there is to make: `FOUR` and the like.
+            out: outputs by their names in `outputs.glsl`.
+            defines: macros of the shader, such as `HAS_VECTOR`.
         """
         steps.fullscreen(
             "upsample.frag",
@@ -85,5 +86,5 @@ class ScreenSpaceOcclusion(Node):
             surfaces=self.surfaces,
             depth=self.depth,
             normal=self.normal,
-            defines={**defines, **self.sizes(steps), "FINAL": 1},
+            defines={**defines, **self.size_defines(steps), "FINAL": 1},
         )

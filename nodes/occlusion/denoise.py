@@ -1,4 +1,4 @@
-"""A filter over surfaces, for whatever is noisy on them."""
+"""A bilateral filter over surfaces."""
 
 from __future__ import annotations
 
@@ -6,38 +6,40 @@ from rendergraph.api import Any, Depth, Input, Internal, Node, Normal, Output, S
 
 
 class Denoise(Node):
-    """The mean of a noisy picture over each of its surfaces.
+    """Remove noise by averaging a picture over each of its surfaces.
 
     An à-trous filter (Dammertz, Sewtz, Hanika and Lensch, "Edge-Avoiding À-Trous Wavelet Transform for fast Global
-    Illumination Filtering", 2010): passes of 3×3 texels, each twice as far apart as in the last, so that three of them
-    reach 7 texels. A texel counts as far as it lies in the pixel's own plane and faces the same way; its values are not
-    looked at, so that nothing is lost that is not noise but a surface's edge.
+    Illumination Filtering", 2010): passes of 3×3 texels with doubled strides, so that three of them reach 7 texels.
+    Weights depend on the distance from the pixel's tangent plane and on normals, not on values, so that edges between
+    surfaces stay sharp.
     """
 
-    source = Input(Any, doc="What is noisy.")
+    source = Input(Any, doc="The noisy picture.")
     depth = Input(Depth, doc="Window depth; positions come from it and its view.")
     normal = Input(Normal, doc="Unit normal, world space.")
-    denoised = Output(like="source", doc="The same without its noise.")
+    denoised = Output(like="source", doc="The picture without noise.")
     surfaces = Internal(format="rgba32f", size="depth", view="depth")
     odd = Internal(format="rgba16f", size="depth")
     even = Internal(format="rgba16f", size="depth")
 
-    passes: int = structural(default=3, min=1, max=6, doc="Each reaches twice as far as the last, the first one texel.")
-    tolerance: float = param(default=0.05, unit="m", min=1e-6, max=1e6, doc="How far off a plane its texels may lie.")
+    passes: int = structural(
+        default=3, min=1, max=6, doc="Each reaches twice as far as the one before, the first one texel."
+    )
+    tolerance: float = param(default=0.05, unit="m", min=1e-6, max=1e6, doc="How far from a plane its texels may lie.")
 
     def record(self, steps: Steps) -> None:
-        """Surfaces, then the passes."""
+        """Record the surfaces and the passes."""
         size = steps.desc(self.surfaces).size
-        steps.fullscreen("surfaces.frag", out=self.surfaces, depth=self.depth, normal=self.normal, reduced=size)
+        steps.fullscreen("surfaces.frag", out=self.surfaces, depth=self.depth, normal=self.normal, reduced_size=size)
         for number in range(self.passes):
             source = self.source if number == 0 else (self.even, self.odd)[number % 2]
-            last = number == self.passes - 1
+            is_last = number == self.passes - 1
             steps.fullscreen(
                 "atrous.frag",
-                out={"mean": self.denoised if last else (self.odd, self.even)[number % 2]},
+                out={"filtered": self.denoised if is_last else (self.odd, self.even)[number % 2]},
                 source=source,
                 surfaces=self.surfaces,
-                screen=size,
+                screen_size=size,
                 stride=1 << number,
-                defines={"FOUR": 1},
+                defines={"HAS_VECTOR": 1},
             )

@@ -1,35 +1,33 @@
-"""Ambient occlusion by horizons, weighted as light is."""
+"""Ambient occlusion by horizons, cosine-weighted."""
 
 from __future__ import annotations
 
 from rendergraph.api import Normal, Output, Port, Steps, param
 
-from ._arms import RefinedArms
+from ._directional import RefinedDirectionalSampling
 
 
-class GTAO(RefinedArms):
-    """How open each surface is, and where to: the share of a white sky's light that reaches it.
+class GTAO(RefinedDirectionalSampling):
+    """Compute cosine-weighted ambient occlusion, and bent normals, from horizons.
 
     Ground-truth ambient occlusion (Jiménez, Wu, Pesce and Jarabo, "Practical Real-Time Strategies for Accurate Indirect
-    Occlusion", 2016). The depth is taken for a landscape, and the hemisphere for a fan of slices through the eye: in
-    each the two horizons are looked for, and the light between them has a closed form. Where the picture shows
-    everything, that is what ray tracing finds.
+    Occlusion", 2016). Depth is interpreted as a height field, and the hemisphere is divided into slices through the
+    view direction. Each has two horizons, and the light between them has a closed form. Where the picture shows all
+    occluders, the result is that of ray tracing.
 
-    Light that surfaces send one another brightens corners. `albedo` adds that by the paper's fit, as if all around had
-    this colour.
+    Interreflection brightens corners. `albedo` approximates it by the paper's fit, for surroundings of this colour.
     """
 
     bent_normal = Output(
         Normal,
         format="rgba16_snorm",
         size="depth",
-        doc="Unit direction from where most of the sky's light comes, world space; 0 where nothing is.",
+        doc="Unit vector, the mean unoccluded direction, world space; 0 for background.",
     )
 
-    albedo: float = param(default=0.0, min=0, max=1, doc="Grey albedo of the surroundings; 0: they send no light on.")
+    albedo: float = param(default=0.0, min=0, max=1, doc="Grey albedo of the surroundings; 0: they reflect no light.")
 
     def record(self, steps: Steps) -> None:
-        """Surfaces, arcs between horizons, the neighbours' mean, full size."""
+        """Record sampling and filtering."""
         out: dict[str, Port] = {port.name: port for port in (self.occlusion, self.bent_normal) if steps.used(port)}
-        bent = "bent_normal" in out
-        self.look(steps, "gtao.frag", out, four=bent, defines={"MULTI_BOUNCE": 1})
+        self.sample_and_filter(steps, "gtao.frag", out, has_vector="bent_normal" in out, defines={"MULTI_BOUNCE": 1})

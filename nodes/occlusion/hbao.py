@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from rendergraph.api import Steps, param
 
-from ._arms import RefinedArms
+from ._directional import RefinedDirectionalSampling
 
 
-class HBAO(RefinedArms):
-    """How open each surface is, from how high the picture's surfaces rise around it.
+class HBAO(RefinedDirectionalSampling):
+    """Compute ambient occlusion from the elevation of the horizon.
 
-    Horizon-based ambient occlusion (Bavoil and Sainz, "Image-Space Horizon-Based Ambient Occlusion", 2008): the depth
-    is taken for a landscape. Along each arm the elevation of what is seen is followed outwards; where it rises above
-    the tangent plane and all before, the sine of the rise is that much sky gone. All of the sky counts alike, not by
-    the cosine, which makes contacts darker than they are; `gtao` weighs it.
+    Horizon-based ambient occlusion (Bavoil and Sainz, "Image-Space Horizon-Based Ambient Occlusion", 2008): depth is
+    interpreted as a height field. Along each direction, samples that rise above the tangent plane and above all samples
+    before raise the horizon, and occlude by the increase of its sine. The sky is weighted uniformly, not by the cosine
+    as in `gtao`, which makes contacts too dark.
     """
 
     attenuation: float = param(
-        default=0.0, min=0, max=1, doc="How much less a surface hides at the radius than nearby; 1 is the paper's."
+        default=0.0, min=0, max=1, doc="Decrease of occlusion from the pixel to the radius; 1 as in the paper."
     )
 
     def record(self, steps: Steps) -> None:
-        """Surfaces, occlusion, the neighbours' mean, full size."""
-        self.look(steps, "hbao.frag", {"occlusion": self.occlusion})
+        """Record sampling and filtering."""
+        self.sample_and_filter(steps, "hbao.frag", {"occlusion": self.occlusion})

@@ -12,76 +12,84 @@ from ._screen_space import reduced_size
 
 
 class SSAOHemisphere(RefinedOcclusion):
-    """How open each surface is, from points in the hemisphere above it that are projected back onto the depth.
+    """Compute ambient occlusion from points in the hemisphere, projected onto the picture.
 
-    The classic of 2007 (Mittring, "Finding Next Gen", 2007). A point that lies behind the surface seen at its place is
-    taken to be inside something, and its direction to be blocked; how much falls with the difference of depth, from 1
-    to 0 at four radii. Directions are spread by least energy, cosine-weighted, and reflected at a random vector of a
-    64×64 noise texture, another at every pixel; along each lie one point within a fifth of the radius and three up to
-    all of it, or up to where the direction leaves the picture. Four pixels share what they find, and a blur that stays
-    on its surface takes the rest of the noise away.
+    The original screen-space ambient occlusion (Mittring, "Finding Next Gen", 2007). A point behind the surface at its
+    texel is assumed to lie inside an object, and its ray to be occluded; occlusion decreases with the difference of
+    depth, to 0 at four radii. Rays are spread by least energy, cosine-weighted, and reflected at a random vector of a
+    64×64 noise texture, another one at every pixel. Each ray has one point within a fifth of the radius, and three up
+    to the radius, or to where the ray leaves the picture. Quads of four pixels are averaged, and a bilateral blur
+    removes the remaining noise.
 
-    By itself a quarter of the pixels does so, with three quarters more points, which leaves as much noise after a blur
-    of about the same span. The others are interpolated, and computed where that would show.
+    By default a quarter of the pixels is computed, with three quarters more points, which after a blur over about the
+    same area leaves as much noise. The others are interpolated, or computed where that would be visible.
     """
 
     noise = Internal(format="rgba16_snorm", size=(64, 64), kept=True)
-    between = Internal(format="r16", size="depth")
-    across = Internal(format="r16", size=reduced_size)
+    interpolated = Internal(format="r16", size="depth")
+    blurred_x = Internal(format="r16", size=reduced_size)
     blurred = Internal(format="r16", size=reduced_size)
 
-    samples: int = define(default=32, min=8, max=128, doc="Points looked at, four a direction; rounded down to fours.")
-    animated: bool = define(default=False, doc="Other directions in each frame, for `accumulate` to put together.")
+    samples: int = define(default=32, min=8, max=128, doc="Points per pixel, four per ray; rounded down to fours.")
+    animated: bool = define(default=False, doc="Sample other directions in each frame, for `accumulate` to average.")
     blur: int = param(
         default=4,
         unit="texels",
         min=0,
         max=16,
-        doc="How far the blur reaches to each side; with `refine` three quarters as many of the reduced size. 0 leaves "
-        "each pixel what it found, and refines all.",
+        doc="Radius of the blur; with `refine`, three quarters as many texels of the reduced size. 0: no blur, and all "
+        "pixels are computed.",
     )
     contrast: float = param(
-        default=0.05, min=0, max=1, doc="What reduced pixels may differ by and still be interpolated; with `refine`."
+        default=0.05, min=0, max=1, doc="With `refine`, the largest difference of reduced pixels that is interpolated."
     )
     nearest: float = param(
-        default=0.0, unit="m", min=0, doc="Surfaces nearer to the eye stay open: their hemispheres cover the screen."
+        default=0.0,
+        unit="m",
+        min=0,
+        doc="Surfaces closer to the camera are not occluded: their hemispheres cover the screen.",
     )
 
     def record(self, steps: Steps) -> None:
-        """Surfaces, noise, occlusion, the blur's two axes, full size."""
-        sizes = self.sizes(steps)
+        """Record surfaces, noise, sampling, the two axes of the blur and the way to full size."""
+        size_defines = self.size_defines(steps)
         self.gather_surfaces(steps)
-        steps.fullscreen("noise.frag", out=self.noise)
-        found = {"unfiltered": self.unfiltered}
+        steps.fullscreen("random_vectors.frag", out=self.noise)
+        unfiltered = {"unfiltered": self.unfiltered}
         if not self.refines(steps):
-            target = self.target(steps, self.blurred)
-            self._look(steps, self.samples, out=found, surfaces=self.surfaces, defines=sizes)
-            self._blur(steps, (self.unfiltered, self.across, target), surfaces=self.surfaces, defines=sizes)
-            if sizes:
+            target = self.reduced_target(steps, self.blurred)
+            self._sample(steps, self.samples, out=unfiltered, surfaces=self.surfaces, defines=size_defines)
+            self._blur(steps, (self.unfiltered, self.blurred_x, target), surfaces=self.surfaces, defines=size_defines)
+            if size_defines:
                 self.upsample(steps, target, {"occlusion": self.occlusion}, {})
             return
-        more = self.samples * 7 // 4
-        self._look(steps, more, out=found, **self.sparse(steps, {"SAMPLES": more}))
-        self._blur(steps, (self.unfiltered, self.across, self.blurred), **self.sparse(steps))
-        out = {"occlusion": self.occlusion, "found": self.between}
-        self.interpolate(steps, "refine.frag", self.blurred, out)
-        self._look(steps, self.samples, **self.over_marked({"unfiltered": self.occlusion}))
-        self._blur(steps, (self.occlusion, self.between, self.occlusion), marked=True)
+        reduced_samples = self.samples * 7 // 4
+        self._sample(steps, reduced_samples, out=unfiltered, **self.sparse(steps, {"SAMPLES": reduced_samples}))
+        self._blur(steps, (self.unfiltered, self.blurred_x, self.blurred), **self.sparse(steps))
+        out = {"occlusion": self.occlusion, "interpolated": self.interpolated}
+        self.interpolate(steps, "interpolate_contrast.frag", self.blurred, out)
+        self._sample(steps, self.samples, **self.masked({"unfiltered": self.occlusion}))
+        self._blur(steps, (self.occlusion, self.interpolated, self.occlusion), is_masked=True)
 
-    def _look(self, steps: Steps, samples: int, **options: Any) -> None:
+    def _sample(self, steps: Steps, samples: int, **options: Any) -> None:
         steps.fullscreen(
             "ssao_hemisphere.frag",
             noise=self.noise,
             directions=spread_points(samples // 4).tolist(),
-            screen=self.screen(steps),
+            screen_size=self.screen_size(steps),
             **options,
         )
 
-    def _blur(self, steps: Steps, ports: tuple[Port, Port, Port], *, marked: bool = False, **options: Any) -> None:
-        """Along both axes; ports are the source, what is between and the target."""
+    def _blur(self, steps: Steps, ports: tuple[Port, Port, Port], *, is_masked: bool = False, **options: Any) -> None:
+        """Record both axes of the blur; ports are source, intermediate and target."""
         for source, out, axis in ((*ports[:2], (1, 0)), (*ports[1:], (0, 1))):
             target: dict[str, Port] = {"blurred": out}
-            where: dict[str, Any] = self.over_marked(target) if marked else {"out": target}
+            targets: dict[str, Any] = self.masked(target) if is_masked else {"out": target}
             steps.fullscreen(
-                "bilateral_blur.frag", source=source, axis=axis, screen=self.screen(steps), **where, **options
+                "bilateral_blur.frag",
+                source=source,
+                axis=axis,
+                screen_size=self.screen_size(steps),
+                **targets,
+                **options,
             )

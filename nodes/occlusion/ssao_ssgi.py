@@ -1,20 +1,21 @@
-"""Occlusion and light between surfaces in one pass, from discs on the screen."""
+"""Ambient occlusion and indirect light in one pass, from discs."""
 
 from __future__ import annotations
 
 from rendergraph.api import Steps
 
-from ._combined import Combined
+from ._occlusion_and_light import OcclusionAndLight
 
 
-class SSAOSSGI(Combined):
-    """How open each surface is and the light that reaches it from the others, from one set of samples.
+class SSAOSSGI(OcclusionAndLight):
+    """Compute ambient occlusion and indirect light from one set of samples.
 
-    What `ssao_disc` (with `form: disc`: strips would be too long here) and `ssgi` find, at little more than the price
-    of one: the samples lie denser towards the middle, so that near half of them lie within the radius of occlusion, a
-    fifth of that of light. This node adds ambient light itself, scaled by its occlusion; the lighting's own is to be 0.
+    The results are those of `ssao_disc` (with `form: disc`, because strips would be too long here) and of `ssgi`, at
+    little more than the cost of one: samples are denser near the pixel, so that nearly half of them lie within the
+    radius of occlusion, which is a fifth of that of light. This node adds ambient light itself, scaled by its
+    occlusion; the ambient light of the lighting node must be 0.
     """
 
     def record(self, steps: Steps) -> None:
-        """Surfaces, light and occlusion, the neighbours' mean, full size; then what is made of it."""
-        self.look_at_both(steps, "discs.frag", {"LIGHT": 1, "OPEN": 1, "BUNNELL": 1})
+        """Record sampling, filtering and the reflection of light."""
+        self.record_both(steps, "discs.frag", {"LIGHT": 1, "OCCLUSION": 1, "BUNNELL": 1})

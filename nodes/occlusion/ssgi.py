@@ -1,4 +1,4 @@
-"""Light between surfaces, from discs on the screen."""
+"""Screen-space global illumination from discs."""
 
 from __future__ import annotations
 
@@ -37,31 +37,33 @@ def _size_beyond(_node: Any, facts: Facts) -> tuple[int, int]:
 
 
 class SSGI(Interreflection):
-    """Light that reaches a surface from the others around it in the picture: one bounce of diffuse interreflection.
+    """Compute one bounce of diffuse light between the surfaces in the picture.
 
-    Screen-space global illumination as the counterpart of `ssao_disc`: each sample is a disc in space that sends its
-    diffuse radiance over, `A cos e cos r / (π d² + A)` of it (Bunnell, "Dynamic Ambient Occlusion and Indirect
-    Lighting", 2005). Along each arm a disc that lies behind nearer ones is not seen and sends nothing; nor does the
-    back of a face. Light of what the picture does not show is missing.
+    Screen-space global illumination as the counterpart of `ssao_disc`: each sample is a disc in space that emits its
+    diffuse radiance, with the form factor `A cos e cos r / (π d² + A)` (Bunnell, "Dynamic Ambient Occlusion and
+    Indirect Lighting", 2005). Discs behind nearer ones of the same direction emit nothing, nor do back faces. Light
+    from surfaces outside the picture is missing.
     """
 
     occlusion = DROPPED
     back_depth = Input(
-        Depth, optional=True, doc="Of a G-buffer of back faces, whose light is gathered too; the other two with it."
+        Depth, optional=True, doc="Depth of a G-buffer of back faces, whose light is gathered too; needs the other two."
     )
     back_normal = Input(Normal, optional=True, doc="Unit normal of back faces, world space.")
-    back_diffuse = Input(Radiance, optional=True, doc="Radiance that back faces send, without its specular part.")
+    back_diffuse = Input(Radiance, optional=True, doc="Diffuse radiance that leaves back faces.")
     beyond_depth = Input(
         Depth,
         size="any",
         optional=True,
         many=True,
-        doc="Of pictures with other views from the same eye, where what lies beside this one is looked for; the other "
-        "two of the same views with it.",
+        doc="Depth of pictures with other views from the same eye, which show surfaces outside this one; needs the "
+        "other two of the same views.",
     )
-    beyond_normal = Input(Normal, size="any", optional=True, many=True, doc="Unit normal there, world space.")
-    beyond_diffuse = Input(Radiance, size="any", optional=True, many=True, doc="Radiance sent there, without specular.")
-    beyond_views = Views(count=_views_beyond, public=False, doc="The views of the pictures beyond.")
+    beyond_normal = Input(
+        Normal, size="any", optional=True, many=True, doc="Unit normal in those pictures, world space."
+    )
+    beyond_diffuse = Input(Radiance, size="any", optional=True, many=True, doc="Diffuse radiance in those pictures.")
+    beyond_views = Views(count=_views_beyond, public=False, doc="The views of those pictures.")
     beyond_surfaces = Internal(
         kind="texture2d_array",
         format="rgba32f",
@@ -75,10 +77,12 @@ class SSGI(Interreflection):
     )
     back_surfaces = Internal(format="rgba32f", size=reduced_size, view="back_depth")
 
-    radius: float = param(default=2.5, unit="m", min=1e-6, max=1e6, doc="Nothing farther away than this sends light.")
+    radius: float = param(
+        default=2.5, unit="m", min=1e-6, max=1e6, doc="Surfaces farther away than this emit no light."
+    )
 
     def record(self, steps: Steps) -> None:
-        """Surfaces, light, the neighbours' mean, full size; then what is made of it."""
+        """Record sampling, filtering and the reflection of light."""
         reads: dict[str, Any] = {"diffuse": self.diffuse, "wider": 1.0}
         macros = {"LIGHT": 1}
         if all(steps.connected(port) for port in (self.back_depth, self.back_normal, self.back_diffuse)):
@@ -89,40 +93,46 @@ class SSGI(Interreflection):
                 out={"surfaces": self.back_surfaces},
                 depth=self.back_depth,
                 normal=self.back_normal,
-                reduced=steps.desc(self.back_surfaces).size,
-                defines=self.sizes(steps),
+                reduced_size=steps.desc(self.back_surfaces).size,
+                defines=self.size_defines(steps),
             )
         if beyond := self.pictures_beyond(steps):
             reads |= {"beyond_surfaces": self.beyond_surfaces, "beyond_light": self.beyond_light}
             macros["BEYOND"] = len(steps.facts.inputs["beyond_depth"])
             for layer, pictures in beyond.items():
                 surfaces, light = self.beyond_surfaces.layer(layer), self.beyond_light.layer(layer)
-                steps.fullscreen("beyond.frag", out={"surfaces": surfaces, "light": light}, **pictures)
+                steps.fullscreen("beyond_surfaces.frag", out={"surfaces": surfaces, "light": light}, **pictures)
             for layer in set(range(macros["BEYOND"])) - beyond.keys():
-                steps.clear(self.beyond_surfaces.layer(layer))  # nothing is there
-        self.look(
-            steps, "discs.frag", {"indirect": self.indirect}, four=True, smooth=self.denoise, defines=macros, **reads
+                steps.clear(self.beyond_surfaces.layer(layer))  # background
+        self.sample_and_filter(
+            steps,
+            "discs.frag",
+            {"indirect": self.indirect},
+            has_vector=True,
+            denoise_passes=self.denoise,
+            defines=macros,
+            **reads,
         )
-        self.send_on(steps)
+        self.reflect_indirect(steps)
 
     def pictures_beyond(self, steps: Steps) -> dict[int, dict[str, Any]]:
-        """Depth, normals and light of one view each, by the number of the view; of whole threes alone."""
-        found: dict[str, dict[str | None, Part]] = {}
+        """Return the inputs of the pictures with other views, by layer; those of which all three are connected."""
+        by_view: dict[str, dict[str | None, Part]] = {}
         for name, port in (
             ("depth", self.beyond_depth),
             ("normal", self.beyond_normal),
             ("diffuse", self.beyond_diffuse),
         ):
             infos = steps.facts.inputs[port.name] if steps.connected(port) else ()
-            found[name] = {info.view: port.link(number) for number, info in enumerate(infos)}
+            by_view[name] = {info.view: port.link(number) for number, info in enumerate(infos)}
         infos = steps.facts.inputs["beyond_depth"] if steps.connected(self.beyond_depth) else ()
         return {
-            number: {name: parts[info.view] for name, parts in found.items()}
+            number: {name: parts[info.view] for name, parts in by_view.items()}
             for number, info in enumerate(infos)
-            if all(info.view in parts for parts in found.values())
+            if all(info.view in parts for parts in by_view.values())
         }
 
     def update(self, frame: Frame) -> None:
-        """The views of what lies beside the picture."""
+        """Set the views of the other pictures."""
         if frame.connected(self.beyond_depth):
             frame.set_views(self.beyond_views, frame.views(self.beyond_depth))

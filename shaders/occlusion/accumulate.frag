@@ -1,5 +1,6 @@
-// The mean of a noisy picture over frames, looked up where each surface was, among texels that showed the same one
-// (C. Schied et al., "Spatiotemporal Variance-Guided Filtering", 2017).
+// Temporal accumulation: the mean of a noisy picture over frames. Each pixel is reprojected to the previous frame and
+// continues the mean of those texels that showed the same surface (C. Schied et al., "Spatiotemporal Variance-Guided
+// Filtering", 2017).
 #include "surfaces.glsl"
 #include <frame.glsl>
 #include <velocity.glsl>
@@ -9,63 +10,65 @@ uniform sampler2D normal;
 #ifdef HAS_VELOCITY
 uniform sampler2D velocity;
 #endif
-uniform sampler2D before;           // last frame's `gathered`
-uniform sampler2D surfaces_before;  // last frame's `surfaces`
+uniform sampler2D previous_mean;
+uniform sampler2D previous_surfaces;
 uniform int frames;
 uniform int frames_at_rest;
-uniform float tolerance;  // share of the distance
-uniform float facing;     // cosine
+uniform float tolerance;  // distance from the tangent plane, relative to the distance from the camera
+uniform float facing;     // least cosine between the normals
 out vec4 accumulated;
-out vec4 gathered;
-out vec4 surfaces;  // normal, world space, as long as there are frames in the mean; distance along the view axis
+out vec4 mean;
+out vec4 surfaces;  // world-space normal times the number of frames in the mean; distance along the view axis
 
-// How many frames a texel of the last frame is the mean of, 0 where it showed another surface than this one.
-float frames_of(ivec2 there, vec3 position, vec3 facing_now) {
-    ivec2 size = textureSize(surfaces_before, 0);
-    if (there != clamp(there, ivec2(0), size - 1)) return 0.0;
-    vec4 was = texelFetch(surfaces_before, there, 0);
-    float count = length(was.xyz);
-    if (count < 0.5 || dot(was.xyz, facing_now) < facing * count) return 0.0;
-    View last = previous_depth_views[0];
-    vec3 seen = view_position(last, (vec2(there) + 0.5) / vec2(size), was.w);
-    vec3 place = (last.inverse_view * vec4(seen, 1.0)).xyz;
-    return abs(dot(place - position, facing_now)) < tolerance * max(was.w, last.range.x) ? count : 0.0;
+// The number of frames in the mean of a texel of the previous frame, 0 if it showed another surface.
+float history_length(ivec2 texel, vec3 position, vec3 surface_normal) {
+    ivec2 size = textureSize(previous_surfaces, 0);
+    if (texel != clamp(texel, ivec2(0), size - 1)) return 0.0;
+    vec4 previous = texelFetch(previous_surfaces, texel, 0);
+    float count = length(previous.xyz);
+    if (count < 0.5 || dot(previous.xyz, surface_normal) < facing * count) return 0.0;
+    View previous_view = previous_depth_views[0];
+    vec3 previous_view_position = view_position(previous_view, (vec2(texel) + 0.5) / vec2(size), previous.w);
+    vec3 previous_position = (previous_view.inverse_view * vec4(previous_view_position, 1.0)).xyz;
+    float plane_distance = abs(dot(previous_position - position, surface_normal));
+    return plane_distance < tolerance * max(previous.w, previous_view.range.x) ? count : 0.0;
 }
 
 void main() {
-    View v = depth_views[0];
+    View view = depth_views[0];
     ivec2 texel = ivec2(gl_FragCoord.xy);
-    vec4 now = texelFetch(source, texel, 0);
-    accumulated = gathered = now;
+    vec4 current = texelFetch(source, texel, 0);
+    accumulated = mean = current;
     surfaces = vec4(0.0);
-    float d = texelFetch(depth, texel, 0).r;
-    if (is_nothing(d)) return;
-    vec2 uv = gl_FragCoord.xy * v.viewport.zw;
-    vec3 position = world_position(v, uv, d);
-    vec3 facing_now = normalize(texelFetch(normal, texel, 0).xyz);
+    float window_depth = texelFetch(depth, texel, 0).r;
+    if (is_nothing(window_depth)) return;
+    vec2 uv = gl_FragCoord.xy * view.viewport.zw;
+    vec3 position = world_position(view, uv, window_depth);
+    vec3 surface_normal = normalize(texelFetch(normal, texel, 0).xyz);
 #ifdef HAS_VELOCITY
-    vec2 moved = texelFetch(velocity, texel, 0).xy;
+    vec2 motion = texelFetch(velocity, texel, 0).xy;
 #else
-    vec2 moved = static_velocity(v, previous_depth_views[0], uv, d);
+    vec2 motion = static_velocity(view, previous_depth_views[0], uv, window_depth);
 #endif
-    // Both pictures are jittered, each in its own way.
-    vec2 place = (uv - v.jitter.xy - moved + previous_depth_views[0].jitter.xy) * v.viewport.xy - 0.5;
-    ivec2 first = ivec2(floor(place + 1e-3));  // what has not moved is one texel's, whatever rounding says
-    vec2 part = max(place - vec2(first), 0.0);
+    // Both frames are jittered, each differently.
+    vec2 previous_uv = uv - view.jitter.xy - motion + previous_depth_views[0].jitter.xy;
+    vec2 previous_texel = previous_uv * view.viewport.xy - 0.5;
+    ivec2 first = ivec2(floor(previous_texel + 1e-3));  // static pixels fall on one texel, whatever the rounding
+    vec2 fraction = max(previous_texel - vec2(first), 0.0);
     vec4 sum = vec4(0.0);
-    float total = 0.0, count = 0.0;
+    float total_weight = 0.0, count = 0.0;
     for (int i = 0; i < 4; ++i) {
-        ivec2 way = ivec2(i & 1, i >> 1);
-        vec2 share = mix(1.0 - part, part, vec2(way));
-        float weight = share.x * share.y;
-        float found = weight > 1e-3 ? frames_of(first + way, position, facing_now) : 0.0;
-        if (found == 0.0) continue;
-        sum += weight * texelFetch(before, first + way, 0);
-        count += weight * found;
-        total += weight;
+        ivec2 corner = ivec2(i & 1, i >> 1);
+        vec2 bilinear = mix(1.0 - fraction, fraction, vec2(corner));
+        float weight = bilinear.x * bilinear.y;
+        float frame_count = weight > 1e-3 ? history_length(first + corner, position, surface_normal) : 0.0;
+        if (frame_count == 0.0) continue;
+        sum += weight * texelFetch(previous_mean, first + corner, 0);
+        count += weight * frame_count;
+        total_weight += weight;
     }
-    float most = float(still_frames > 0 ? max(frames, frames_at_rest) : frames);
-    count = 1.0 + (total > 0.0 ? min(floor(count / total + 0.5), most - 1.0) : 0.0);
-    if (total > 0.0) accumulated = gathered = mix(sum / total, now, 1.0 / count);
-    surfaces = vec4(facing_now * count, linear_depth(v, uv, d));
+    float max_count = float(still_frames > 0 ? max(frames, frames_at_rest) : frames);
+    count = 1.0 + (total_weight > 0.0 ? min(floor(count / total_weight + 0.5), max_count - 1.0) : 0.0);
+    if (total_weight > 0.0) accumulated = mean = mix(sum / total_weight, current, 1.0 / count);
+    surfaces = vec4(surface_normal * count, linear_depth(view, uv, window_depth));
 }

@@ -1,149 +1,158 @@
-// Samples in the disc that the radius covers on the screen, along arms from near to far. The surface seen at each hides
-// some of the sky (OPEN), as a strip of the arm's slice or with BUNNELL as a disc in space, and sends light (LIGHT) as
-// a disc.
+// Samples surfaces in the disc that a radius covers on the screen, along directions from near to far. Each sample
+// occludes (OCCLUSION), as a strip of a slice or with BUNNELL as a disc in space, and emits light (LIGHT) as a disc.
 #include "surfaces.glsl"
-#include "arms.glsl"
-#if defined(OPEN) && !defined(BUNNELL)
+#include "directions.glsl"
+#if defined(OCCLUSION) && !defined(BUNNELL)
 #define STRIPS
 #include "slice.glsl"
 #include "strip.glsl"
 uniform float thickness;  // in radii
 #endif
-#include "quad.glsl"
+#include "quad_mean.glsl"
 #include "value.glsl"
 #include <disc_form_factor.glsl>
 uniform sampler2D surfaces;
-uniform ivec2 screen;
-uniform float radius;  // metres
+uniform ivec2 screen_size;
+uniform float radius;  // of occlusion, in metres
 #ifdef BUNNELL
-#include "discs_hide.glsl"
+#include "bunnell.glsl"
 #endif
 #ifdef LIGHT
 uniform sampler2D diffuse;
 #ifdef BEYOND
-#include "beyond.glsl"
+#include "beyond_views.glsl"
 #endif
-uniform float wider;  // light comes from this many times as far
+uniform float wider;  // the radius of light, as a multiple
 #else
 const float wider = 1.0;
 #endif
 out Value unfiltered;
 
-// Light from discs close by is limited by their size, or single ones would glow: these are larger.
-const float SENDING_DISCS = 512.0;
+// Every disc is as large as if there were this many. Their size limits the light of single discs close to a surface,
+// which would glow otherwise.
+const float EMITTING_DISCS = 512.0;
 
 #ifdef BACK
-#include "behind.glsl"
+#include "back_faces.glsl"
 #endif
 
-// Light in xyz, irradiance over pi, and openness in w.
-vec4 gathered_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
+// Irradiance over pi in xyz, ambient visibility in w.
+vec4 gather(View view, ivec2 texel, vec2 uv, vec3 position, vec4 surface) {
     ivec2 size = textureSize(surfaces, 0);
-    float w = clip_w(v, here.w);
-    float region = radius * wider;
-    vec2 reach = covered(v, region, w);
-    vec2 along = first_arm(ARMS);
-    vec3 eye = to_eye(v, position);
-    float blocked = 0.0;
-    float whole = 0.0;  // what could be, of all arms
+    float w = clip_w(view, surface.w);
+    float search_radius = radius * wider;
+    vec2 radius_uv = projected_length(view, search_radius, w);
+    vec2 direction = first_direction(DIRECTIONS);
+    vec3 view_dir = view_space_view_dir(view, position);
+    float occlusion = 0.0;
+    float total_weight = 0.0;
     vec3 light = vec3(0.0);
-    for (int arm = 0; arm < ARMS; ++arm) {
-        float stretch = stretch_of(arm);
-        float horizon = -1.0;  // cosine of the angle to the eye; what lies below is hidden already
-        float hidden = 0.0;
+    for (int direction_index = 0; direction_index < DIRECTIONS; ++direction_index) {
+        float jitter = step_jitter(direction_index);
+        float cos_horizon = -1.0;  // to the view direction; samples below the horizon are hidden
+        float direction_occlusion = 0.0;
 #ifdef STRIPS
-        Slice s = slice_along(along, eye, here.xyz);
-        float skyline = tangent_plane(s, 1.0);  // the same of what lies within the radius, with its rims
-        Sights sights = sights_along(v, middle, reach * along);
-        float looked = 0.0;  // how far out, as a share of the region
+        Slice s = make_slice(direction, view_dir, surface.xyz);
+        float cos_covered = cos_tangent_plane(s, 1.0);  // the horizon of strips within the radius of occlusion
+        ViewRays rays = view_rays(view, uv, radius_uv * direction);
+        float strip_end = 0.0;  // of the last strip, as a fraction of the search radius
 #endif
         for (int i = 0; i < STEPS; ++i) {
-            float u = (float(i) + stretch) / float(STEPS);
-            vec2 place = middle + u * u * reach * along;
-            ivec2 there = ivec2(floor(place * vec2(size)));
-            if (there == texel) continue;
+            float u = (float(i) + jitter) / float(STEPS);
+            vec2 sample_uv = uv + u * u * radius_uv * direction;
+            ivec2 sample_texel = ivec2(floor(sample_uv * vec2(size)));
+            if (sample_texel == texel) continue;
 #ifdef STRIPS
-            float from = looked;
+            float strip_begin = strip_end;
             float outer = u + 0.5 / float(STEPS);
-            looked = outer * outer;
+            strip_end = outer * outer;
 #endif
-            bool inside = there == clamp(there, ivec2(0), size - 1);
-            float share = 4.0 * PI * u * u * u * region * region;
-            vec4 seen;
-            vec3 at;
+            bool on_screen = sample_texel == clamp(sample_texel, ivec2(0), size - 1);
+            // The area of the ring of the screen that all samples of this step stand for together, at the distance of
+            // the pixel; relative to the mean of all steps.
+            float ring_area = 4.0 * PI * u * u * u * search_radius * search_radius;
+            vec4 sample_surface;
+            vec3 sample_position;
 #ifdef BEYOND
-            ivec3 aside;
-            if (!inside && !seen_beyond(v, place, seen, at, aside)) continue;
+            ivec3 beyond_texel;
+            if (!on_screen && !find_beyond(view, sample_uv, sample_surface, sample_position, beyond_texel)) continue;
 #else
-            if (!inside) continue;
+            if (!on_screen) continue;
 #endif
-            if (inside) {
+            if (on_screen) {
 #if defined(LIGHT) && defined(BACK)
-                light += light_from_behind(v, there, position, here, w, region, share);
+                light += back_face_light(view, sample_texel, position, surface, w, search_radius, ring_area);
 #endif
-                seen = look_up(surfaces, there, size);
-                if (seen.w == 0.0) continue;
-                at = view_position(v, place_for(there, size, screen), seen.w);
+                sample_surface = fetch_texel(surfaces, sample_texel, size);
+                if (sample_surface.w == 0.0) continue;
+                sample_position = view_position(view, texel_uv(sample_texel, size, screen_size), sample_surface.w);
             }
-            vec3 offset = at - position;
-            vec3 sight = v.projection[2][3] == 0.0 ? vec3(0.0, 0.0, -1.0) : at / seen.w;
-            float apart = length(offset);
-            float rise = dot(eye, offset) / apart;
-            float facing = -dot(seen.xyz, offset) / apart;
-            float far_off = max(here.w, seen.w);
-            // The ring's share of the disc on the screen, at the distance of what is seen there; rings grow outwards.
-            float scale = clip_w(v, seen.w) / w;
-            float ring = share * scale * scale;
-            float slant = max(abs(dot(seen.xyz, sight)), 0.05);
-            bool in_sight = rise >= horizon;
-            if (apart <= region && dot(here.xyz, offset) > 0.0) horizon = max(horizon, rise);
+            vec3 offset = sample_position - position;
+            vec3 ray = view.projection[2][3] == 0.0 ? vec3(0.0, 0.0, -1.0) : sample_position / sample_surface.w;
+            float sample_distance = length(offset);
+            float cos_sample = dot(view_dir, offset) / sample_distance;
+            float cos_emitter = -dot(sample_surface.xyz, offset) / sample_distance;
+            float max_distance = max(surface.w, sample_surface.w);
+            float scale = clip_w(view, sample_surface.w) / w;
+            float sample_area = ring_area * scale * scale;  // the same ring at the distance of the sample
+            float cos_ray = max(abs(dot(sample_surface.xyz, ray)), 0.05);
+            bool is_visible = cos_sample >= cos_horizon;
+            if (sample_distance <= search_radius && dot(surface.xyz, offset) > 0.0) {
+                cos_horizon = max(cos_horizon, cos_sample);
+            }
 #ifdef LIGHT
-            if (in_sight && facing > 0.0 && apart <= region && rises(v, offset, here.xyz, far_off)) {
-                vec3 sent;
+            if (is_visible && cos_emitter > 0.0 && sample_distance <= search_radius
+                && is_above_tangent_plane(view, offset, surface.xyz, max_distance)) {
+                vec3 radiance;
 #ifdef BEYOND
-                if (!inside) sent = texelFetch(beyond_light, aside, 0).rgb;
+                if (!on_screen) radiance = texelFetch(beyond_light, beyond_texel, 0).rgb;
                 else
 #endif
-                sent = look_up(diffuse, texel_for(there, size, screen), screen).rgb;
-                float towards = dot(here.xyz, offset) / apart;
-                light += sent * disc_form_factor(apart, ring / SENDING_DISCS / slant, facing, towards);
+                radiance = fetch_texel(diffuse, screen_texel(sample_texel, size, screen_size), screen_size).rgb;
+                float cos_receiver = dot(surface.xyz, offset) / sample_distance;
+                float disc_area = sample_area / EMITTING_DISCS / cos_ray;
+                light += radiance * disc_form_factor(sample_distance, disc_area, cos_emitter, cos_receiver);
             }
 #endif
 #ifdef BUNNELL
-            hidden += hidden_by(v, in_sight, offset, here.xyz, far_off, seen.xyz, sight, ring);
+            direction_occlusion += sample_occlusion(
+                view, is_visible, offset, surface.xyz, max_distance, sample_surface.xyz, ray, sample_area);
 #endif
 #ifdef STRIPS
-            if (apart > radius || !rises(v, offset, here.xyz, far_off)) continue;
-            vec2 strip = strip_of(sights, from, looked, position, offset, seen.xyz, eye, thickness * radius);
-            strip = clamp(strip, skyline, 1.0);
-            hidden += arc(s, strip.x, 1.0) - arc(s, strip.y, 1.0);
-            skyline = strip.y;
+            if (sample_distance > radius || !is_above_tangent_plane(view, offset, surface.xyz, max_distance)) continue;
+            vec2 cosines = strip_cosines(rays, strip_begin, strip_end, position, offset, sample_surface.xyz, view_dir,
+                                         thickness * radius);
+            cosines = clamp(cosines, cos_covered, 1.0);
+            direction_occlusion += horizon_integral(s, cosines.x, 1.0) - horizon_integral(s, cosines.y, 1.0);
+            cos_covered = cosines.y;
 #endif
         }
 #ifdef BUNNELL
-        blocked += min(hidden, MOST);
-        whole += 1.0;
+        occlusion += min(direction_occlusion, MAX_DIRECTION_OCCLUSION);
+        total_weight += 1.0;
 #endif
 #ifdef STRIPS
-        blocked += s.share * hidden;
-        whole += s.share * whole_side(s, 1.0);
+        occlusion += s.projected_length * direction_occlusion;
+        total_weight += s.projected_length * side_integral(s, 1.0);
 #endif
-        along = turned(along, ARMS);
+        direction = next_direction(direction, DIRECTIONS);
     }
-    return vec4(light * SENDING_DISCS / float(ARMS * STEPS), whole > 0.0 ? 1.0 - blocked / whole : 1.0);
+    float visibility = total_weight > 0.0 ? 1.0 - occlusion / total_weight : 1.0;
+    return vec4(light * EMITTING_DISCS / float(DIRECTIONS * STEPS), visibility);
 }
 
 void main() {
-    View v = surfaces_views[0];
-    ivec2 texel = texel_here(textureSize(surfaces, 0));
-    vec4 here = texelFetch(surfaces, texel, 0);
-    vec2 middle = place_for(texel, textureSize(surfaces, 0), screen);
-    vec3 position = view_position(v, middle, here.w);
-    vec4 found = here.w == 0.0 ? vec4(0.0, 0.0, 0.0, 1.0) : gathered_at(v, texel, middle, position, here);
-    found = mean_of_quad(found, here, position, 0.1 * radius + depth_error(v, here.w));
-#ifdef FOUR
-    unfiltered = found;
+    View view = surfaces_views[0];
+    ivec2 size = textureSize(surfaces, 0);
+    ivec2 texel = current_surface_texel(size);
+    vec4 surface = texelFetch(surfaces, texel, 0);
+    vec2 uv = texel_uv(texel, size, screen_size);
+    vec3 position = view_position(view, uv, surface.w);
+    vec4 value = surface.w == 0.0 ? vec4(0.0, 0.0, 0.0, 1.0) : gather(view, texel, uv, position, surface);
+    value = quad_mean(value, surface, position, 0.1 * radius + depth_error(view, surface.w));
+#ifdef HAS_VECTOR
+    unfiltered = value;
 #else
-    unfiltered = found.w;
+    unfiltered = value.w;
 #endif
 }

@@ -1,56 +1,58 @@
-// Horizon-based ambient occlusion (L. Bavoil and M. Sainz, "Image-Space Horizon-Based Ambient Occlusion", 2008): along
-// each arm the highest elevation seen so far, and of each rise what its distance leaves.
+// Horizon-based ambient occlusion (L. Bavoil and M. Sainz, "Image-Space Horizon-Based Ambient Occlusion", 2008):
+// follows the horizon along each direction, and attenuates each increase of its elevation by distance.
 #include "surfaces.glsl"
 #ifdef SPARSE
-#define ARMS max(SAMPLES / STEPS * 3 / 4, 2)  // reduced pixels share with more than twice as many
+#define DIRECTIONS max(SAMPLES / STEPS * 3 / 4, 2)  // fewer, because more than twice as many pixels are averaged
 #endif
-#include "arms.glsl"
-#include "quad.glsl"
+#include "directions.glsl"
+#include "quad_mean.glsl"
 uniform sampler2D surfaces;
-uniform ivec2 screen;
+uniform ivec2 screen_size;
 uniform float radius;       // metres
-uniform float attenuation;  // 0 to 1
+uniform float attenuation;  // at the radius, 0 to 1
 out float unfiltered;
 
-float open_at(View v, vec2 middle, vec3 position, vec4 here) {
+float compute_visibility(View view, vec2 uv, vec3 position, vec4 surface) {
     ivec2 size = textureSize(surfaces, 0);
-    vec2 reach = covered(v, radius, clip_w(v, here.w));
-    vec3 eye = to_eye(v, position);
-    vec2 along = first_arm(ARMS);
-    float blocked = 0.0;
-    float region = radius * radius;
-    float fade = attenuation / region;
-    for (int arm = 0; arm < ARMS; ++arm) {
-        float stretch = stretch_of(arm);
-        // The tangent plane's line in the arm's slice, by its cosine to the eye: the sine of its elevation.
-        vec3 across = normalize(cross(vec3(along, 0.0), eye));
-        vec3 tangent = cross(here.xyz, across);
-        float horizon = dot(tangent, eye) * inversesqrt(max(dot(tangent, tangent), 1e-12));
-        for (int i = 0; i < STEPS; ++i) {
-            float out_to = (float(i) + stretch) / float(STEPS);
-            ivec2 there = ivec2(floor((middle + out_to * reach * along) * vec2(size)));
-            vec4 seen = look_up(surfaces, there, size);
-            vec3 offset = view_position(v, place_for(there, size, screen), seen.w) - position;
-            float square = dot(offset, offset);
-            float rise = dot(offset, eye) / length(offset) - horizon;
-            bool inside = there == clamp(there, ivec2(0), size - 1) && seen.w > 0.0 && square <= region;
-            bool counts = inside && rise > 0.0 && rises(v, offset, here.xyz, max(here.w, seen.w));
-            rise = counts ? rise : 0.0;
-            blocked += rise * (1.0 - fade * square);
-            horizon += rise;
+    vec2 radius_uv = projected_length(view, radius, clip_w(view, surface.w));
+    vec3 view_dir = view_space_view_dir(view, position);
+    vec2 direction = first_direction(DIRECTIONS);
+    float occlusion = 0.0;
+    float radius_squared = radius * radius;
+    float falloff = attenuation / radius_squared;
+    for (int i = 0; i < DIRECTIONS; ++i) {
+        float jitter = step_jitter(i);
+        // Starts at the tangent plane. The sine of the elevation is the cosine of the angle to the view direction.
+        vec3 slice_normal = normalize(cross(vec3(direction, 0.0), view_dir));
+        vec3 tangent = cross(surface.xyz, slice_normal);
+        float sin_horizon = dot(tangent, view_dir) * inversesqrt(max(dot(tangent, tangent), 1e-12));
+        for (int j = 0; j < STEPS; ++j) {
+            float fraction = (float(j) + jitter) / float(STEPS);
+            ivec2 sample_texel = ivec2(floor((uv + fraction * radius_uv * direction) * vec2(size)));
+            vec4 sample_surface = fetch_texel(surfaces, sample_texel, size);
+            vec3 offset = view_position(view, texel_uv(sample_texel, size, screen_size), sample_surface.w) - position;
+            float distance_squared = dot(offset, offset);
+            float increase = dot(offset, view_dir) / length(offset) - sin_horizon;
+            bool on_screen = sample_texel == clamp(sample_texel, ivec2(0), size - 1);
+            bool in_radius = on_screen && sample_surface.w > 0.0 && distance_squared <= radius_squared;
+            bool occludes = in_radius && increase > 0.0
+                && is_above_tangent_plane(view, offset, surface.xyz, max(surface.w, sample_surface.w));
+            increase = occludes ? increase : 0.0;
+            occlusion += increase * (1.0 - falloff * distance_squared);
+            sin_horizon += increase;
         }
-        along = turned(along, ARMS);
+        direction = next_direction(direction, DIRECTIONS);
     }
-    return 1.0 - blocked / float(ARMS);
+    return 1.0 - occlusion / float(DIRECTIONS);
 }
 
 void main() {
-    View v = surfaces_views[0];
+    View view = surfaces_views[0];
     ivec2 size = textureSize(surfaces, 0);
-    ivec2 texel = texel_here(size);
-    vec4 here = texelFetch(surfaces, texel, 0);
-    vec2 middle = place_for(texel, size, screen);
-    vec3 position = view_position(v, middle, here.w);
-    float open = here.w == 0.0 ? 1.0 : open_at(v, middle, position, here);
-    unfiltered = mean_of_quad(vec4(open), here, position, 0.1 * radius + depth_error(v, here.w)).x;
+    ivec2 texel = current_surface_texel(size);
+    vec4 surface = texelFetch(surfaces, texel, 0);
+    vec2 uv = texel_uv(texel, size, screen_size);
+    vec3 position = view_position(view, uv, surface.w);
+    float visibility = surface.w == 0.0 ? 1.0 : compute_visibility(view, uv, position, surface);
+    unfiltered = quad_mean(vec4(visibility), surface, position, 0.1 * radius + depth_error(view, surface.w)).x;
 }

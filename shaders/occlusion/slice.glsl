@@ -1,47 +1,49 @@
-// A slice of a pixel's hemisphere through the eye and an arm and its opposite (J. Jimenez et al., "Practical Real-Time
-// Strategies for Accurate Indirect Occlusion", 2016). Angles in it count from the direction to the eye, towards the
-// arm. What is seen there is given by its cosine to the eye and its side, 1 towards the arm and -1 away from it: all
-// but one term of the paper's integrals follows from those without a trigonometric function.
+// A slice of a pixel's hemisphere: the half plane through the view direction and a direction on the screen, with its
+// opposite (J. Jimenez et al., "Practical Real-Time Strategies for Accurate Indirect Occlusion", 2016). Angles are
+// measured from the view direction. A direction in the slice is given by the cosine of its angle and its side, 1
+// towards the direction on the screen and -1 away from it; all but one term of the paper's integrals follow from those
+// without a trigonometric function.
 struct Slice {
-    vec3 eye;      // unit, from the pixel towards the eye
-    vec3 tangent;  // unit, across it, towards the arm
-    float lean;    // of the normal, as far as it lies in the slice
-    float cosine;  // of the lean
-    float sine;
-    float share;   // how much of the normal that is: the slice's part of the light
-    float whole;   // light of a white sky from all of the slice, down to the tangent plane on both sides
+    vec3 view_dir;           // unit
+    vec3 tangent;            // unit, orthogonal to the view direction, towards the direction on the screen
+    float normal_angle;      // of the normal projected into the slice
+    float cos_normal;        // of that angle
+    float sin_normal;
+    float projected_length;  // of the normal: the weight of the slice
+    float full_integral;     // cosine-weighted, of both sides down to the tangent plane
 };
 
-Slice slice_along(vec2 along, vec3 eye, vec3 normal) {
-    vec3 tangent = cross(eye, normalize(cross(vec3(along, 0.0), eye)));
-    vec2 upright = vec2(dot(normal, eye), dot(normal, tangent));
-    float share = max(length(upright), 1e-6);
-    float lean = atan(upright.y, upright.x);
-    vec2 turn = upright / share;
-    return Slice(eye, tangent, lean, turn.x, turn.y, share, turn.x + lean * turn.y);
+Slice make_slice(vec2 direction, vec3 view_dir, vec3 normal) {
+    vec3 tangent = cross(view_dir, normalize(cross(vec3(direction, 0.0), view_dir)));
+    vec2 projected = vec2(dot(normal, view_dir), dot(normal, tangent));
+    float projected_length = max(length(projected), 1e-6);
+    float angle = atan(projected.y, projected.x);
+    vec2 unit = projected / projected_length;
+    return Slice(view_dir, tangent, angle, unit.x, unit.y, projected_length, unit.x + angle * unit.y);
 }
 
-// The cosine to the eye of the tangent plane on a side.
-float tangent_plane(Slice s, float side) {
-    return -side * s.sine;
+// The cosine of the angle between the view direction and the tangent plane on a side.
+float cos_tangent_plane(Slice s, float side) {
+    return -side * s.sin_normal;
 }
 
-// Light of a white sky from between the eye and a cosine to it, weighted by the cosine and the slices' spreading.
-float arc(Slice s, float rise, float side) {
-    float across = 1.0 - rise * rise;
-    return 0.5 * (s.cosine * across + side * s.sine * (acos(rise) - rise * sqrt(across)));
+// The cosine-weighted integral of a side from the view direction to a horizon.
+float horizon_integral(Slice s, float cos_horizon, float side) {
+    float sin_squared = 1.0 - cos_horizon * cos_horizon;
+    float sine_term = acos(cos_horizon) - cos_horizon * sqrt(sin_squared);
+    return 0.5 * (s.cos_normal * sin_squared + side * s.sin_normal * sine_term);
 }
 
 // The same of a whole side, down to the tangent plane.
-float whole_side(Slice s, float side) {
-    return 0.5 * (s.whole + side * 0.5 * PI * s.sine);
+float side_integral(Slice s, float side) {
+    return 0.5 * (s.full_integral + side * 0.5 * PI * s.sin_normal);
 }
 
-// Its direction between two angles, before < 0 < after, as long as there is light.
-vec3 arc_direction(Slice s, float before, float after) {
-    float n = s.lean;
-    float t = 6.0 * (sin(before - n) + sin(after - n)) - sin(3.0 * before - n) - sin(3.0 * after - n) + 16.0 * sin(n)
-            - 3.0 * (sin(before + n) + sin(after + n));
-    float e = 8.0 * cos(n) - cos(3.0 * before - n) - cos(3.0 * after - n) - 3.0 * (cos(before + n) + cos(after + n));
-    return (s.tangent * t + s.eye * e) / 12.0;
+// The mean direction between two horizon angles, h1 < 0 < h2, as long as its integral.
+vec3 bent_direction(Slice s, float h1, float h2) {
+    float n = s.normal_angle;
+    float t = 6.0 * (sin(h1 - n) + sin(h2 - n)) - sin(3.0 * h1 - n) - sin(3.0 * h2 - n) + 16.0 * sin(n)
+            - 3.0 * (sin(h1 + n) + sin(h2 + n));
+    float e = 8.0 * cos(n) - cos(3.0 * h1 - n) - cos(3.0 * h2 - n) - 3.0 * (cos(h1 + n) + cos(h2 + n));
+    return (s.tangent * t + s.view_dir * e) / 12.0;
 }

@@ -1,49 +1,53 @@
-// What a sample stands for in its arm's slice: the strip of its surface half-way to those before and after it, and
-// what is taken to lie behind (O. Therrien, Y. Levesque and G. Gilet, "Screen Space Indirect Lighting with Visibility
-// Bitmask", 2023).
+// The strip of a surface that a sample stands for: from half-way to the sample before to half-way to the one after, and
+// `thickness` deep (O. Therrien, Y. Levesque and G. Gilet, "Screen Space Indirect Lighting with Visibility Bitmask",
+// 2023).
 
-// The lines of sight along an arm: each starts at `start` and leads along `way`, both of which change evenly with the
-// share of the arm's reach that it is away from the pixel.
-struct Sights {
-    vec3 start;
-    vec3 start_change;
-    vec3 way;
-    vec3 way_change;
+// The view rays along a direction on the screen. Origin and direction change linearly with the distance from the pixel,
+// as a fraction of the search radius.
+struct ViewRays {
+    vec3 origin;
+    vec3 origin_change;
+    vec3 direction;
+    vec3 direction_change;
 };
 
-Sights sights_along(View v, vec2 middle, vec2 reach) {
-    vec3 here = view_position(v, middle, 1.0);
-    vec3 change = view_position(v, middle + reach, 1.0) - here;
-    if (v.projection[2][3] == 0.0) return Sights(here, change, vec3(0.0, 0.0, -1.0), vec3(0.0));
-    return Sights(vec3(0.0), vec3(0.0), here, change);
+ViewRays view_rays(View v, vec2 uv, vec2 radius_uv) {
+    vec3 start = view_position(v, uv, 1.0);
+    vec3 change = view_position(v, uv + radius_uv, 1.0) - start;
+    if (v.projection[2][3] == 0.0) return ViewRays(start, change, vec3(0.0, 0.0, -1.0), vec3(0.0));
+    return ViewRays(vec3(0.0), vec3(0.0), start, change);
 }
 
-// Where a surface, extended, is seen at another share of the reach: an offset from the pixel, for one of its own. No
-// farther along it than the pixel is away.
-vec3 extended(Sights s, float share, vec3 position, vec3 offset, vec3 normal) {
-    vec3 start = s.start + share * s.start_change - position;
-    vec3 way = s.way + share * s.way_change;
-    float slope = dot(normal, way);
-    vec3 there = start + way * (dot(normal, offset - start) / slope);
-    vec3 along = there - offset;
-    return abs(slope) > 1e-4 && dot(along, along) < dot(offset, offset) ? there : offset;
+// Where the tangent plane of a sample meets the view ray at another fraction of the radius. Takes and returns an offset
+// from the pixel; returns the sample's own if the plane is nearly parallel to the ray, or the result farther from it
+// than the pixel is.
+vec3 extend_plane(ViewRays rays, float fraction, vec3 position, vec3 offset, vec3 normal) {
+    vec3 origin = rays.origin + fraction * rays.origin_change - position;
+    vec3 direction = rays.direction + fraction * rays.direction_change;
+    float slope = dot(normal, direction);
+    vec3 extended = origin + direction * (dot(normal, offset - origin) / slope);
+    vec3 difference = extended - offset;
+    return abs(slope) > 1e-4 && dot(difference, difference) < dot(offset, offset) ? extended : offset;
 }
 
-// The cosine of an offset to the eye.
-float rise_of(vec3 offset, vec3 eye) {
-    return dot(offset, eye) * inversesqrt(max(dot(offset, offset), 1e-20));
+// The cosine of the angle between an offset and the view direction.
+float cos_to_viewer(vec3 offset, vec3 view_dir) {
+    return dot(offset, view_dir) * inversesqrt(max(dot(offset, offset), 1e-20));
 }
 
-// The cosines to the eye between which the strip lies, seen from a pixel: of its rear and of its front.
+// The cosines of the angles to the view direction between which a pixel sees a strip: x of its back, y of its front.
 //
-// Args: the shares of the reach that it goes from and to, the pixel's position, the sample's offset from it and its
-// normal, and how thick it is in metres.
-vec2 strip_of(Sights s, float from, float to, vec3 position, vec3 offset, vec3 normal, vec3 eye, float thickness) {
-    vec3 at = position + offset;
-    vec3 sight = s.way_change == vec3(0.0) ? s.way : at * inversesqrt(dot(at, at));
-    float middle = rise_of(offset, eye);
-    float before = rise_of(extended(s, from, position, offset, normal), eye);
-    float after = rise_of(extended(s, to, position, offset, normal), eye);
-    float behind = rise_of(offset + sight * thickness, eye);
-    return clamp(vec2(min(min(middle, before), behind), max(middle, after)), -1.0, 1.0);
+// Args: the fractions of the radius where the strip begins and ends, the pixel's position, the sample's offset from it
+// and its normal, the view direction, and the thickness in metres.
+vec2 strip_cosines(
+    ViewRays rays, float begin, float end, vec3 position, vec3 offset, vec3 normal, vec3 view_dir, float thickness
+) {
+    vec3 sample_position = position + offset;
+    vec3 ray = rays.direction_change == vec3(0.0)
+        ? rays.direction : sample_position * inversesqrt(dot(sample_position, sample_position));
+    float cos_middle = cos_to_viewer(offset, view_dir);
+    float cos_begin = cos_to_viewer(extend_plane(rays, begin, position, offset, normal), view_dir);
+    float cos_end = cos_to_viewer(extend_plane(rays, end, position, offset, normal), view_dir);
+    float cos_back = cos_to_viewer(offset + ray * thickness, view_dir);
+    return clamp(vec2(min(min(cos_middle, cos_begin), cos_back), max(cos_middle, cos_end)), -1.0, 1.0);
 }

@@ -1,16 +1,17 @@
-// What a pass finds out for each pixel: how open it is, or with FOUR that in w and in xyz light or a direction.
-#ifdef FOUR
+// The type of what occlusion passes compute and filter: ambient visibility (1 open, 0 closed), or with HAS_VECTOR a
+// vec4 with visibility in w, and in xyz indirect light or the direction of the bent normal.
+#ifdef HAS_VECTOR
 #define Value vec4
-#define PARTS rgba
-const Value NOTHING = vec4(0.0, 0.0, 0.0, 1.0);
+#define VALUE_CHANNELS rgba
+const Value OPEN_VALUE = vec4(0.0, 0.0, 0.0, 1.0);
 #else
 #define Value float
-#define PARTS r
-const Value NOTHING = 1.0;
+#define VALUE_CHANNELS r
+const Value OPEN_VALUE = 1.0;
 #endif
 
-float openness(Value value) {
-#ifdef FOUR
+float ambient_visibility(Value value) {
+#ifdef HAS_VECTOR
     return value.w;
 #else
     return value;

@@ -204,7 +204,8 @@ def test_what_is_kept_says_so(cli: Any) -> None:
 def test_a_node_that_is_installed_says_how_it_is_extended(cli: Any, tmp_path: Path) -> None:
     shown = cli("explain", "hbao").out
     assert (
-        "  from rendergraph.nodes.occlusion.hbao import HBAO\n  from rendergraph.nodes.occlusion._arms import" in shown
+        "  from rendergraph.nodes.occlusion.hbao import HBAO\n  from rendergraph.nodes.occlusion._directional import"
+        in shown
     )
     (tmp_path / "loose.py").write_text(
         'from rendergraph.nodes.occlusion.hbao import HBAO\n\n\nclass Loose(HBAO):\n    """The same."""\n'

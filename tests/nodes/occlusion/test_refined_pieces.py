@@ -21,10 +21,10 @@ CONTRAST = 0.2
 class ShownHorizons(GTAO):
     """The same with its scratch textures to look at."""
 
-    whole = Output(AnyTexel, format="rgba32f", size="depth", view="depth", doc="Surfaces.")  # type: ignore[assignment]
+    full_surfaces = Output(AnyTexel, format="rgba32f", size="depth", view="depth", doc="Surfaces.")  # type: ignore[assignment]
     unfiltered = Output(AnyTexel, format="r16f", size=reduced_size, doc="Before the mean.")  # type: ignore[assignment]
-    neighbours = Output(AnyTexel, format="r16", size=reduced_size, doc="After it.")  # type: ignore[assignment]
-    bent = Output(AnyTexel, format="r32f", size=reduced_size, doc="The same, -1 where it bends.")  # type: ignore[assignment]
+    averaged = Output(AnyTexel, format="r16", size=reduced_size, doc="After it.")  # type: ignore[assignment]
+    marked = Output(AnyTexel, format="r32f", size=reduced_size, doc="The same, -1 where it bends.")  # type: ignore[assignment]
 
 
 def moved(texels: Floats, up: int, right: int) -> Floats:
@@ -40,13 +40,13 @@ def test_two_sizes_in_numpy(session: rg.Session, tmp_path: Path, size: tuple[int
     type: shown_horizons
     inputs: {{depth: g.depth, normal: g.normal}}
     params: {{radius: {RADIUS}, contrast: {CONTRAST}}}
-outputs: {{occlusion: ao.occlusion, whole: ao.whole, unfiltered: ao.unfiltered, neighbours: ao.neighbours, bent: ao.bent}}
+outputs: {{occlusion: ao.occlusion, full_surfaces: ao.full_surfaces, unfiltered: ao.unfiltered, averaged: ao.averaged, marked: ao.marked}}
 """
     frame, camera = drawn(session, tmp_path, size, text, ShownHorizons)
     found, unfiltered, mean, bent = (
-        flipped(frame, name)[..., 0] for name in ("occlusion", "unfiltered", "neighbours", "bent")
+        flipped(frame, name)[..., 0] for name in ("occlusion", "unfiltered", "averaged", "marked")
     )
-    whole = flipped(frame, "whole")
+    whole = flipped(frame, "full_surfaces")
     height, width = mean.shape
     where = positions(whole[..., 3], *places(size, size), camera)
     x, y = (

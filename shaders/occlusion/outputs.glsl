@@ -1,4 +1,5 @@
-// What the last pass of a technique writes, at full size and filtered; a pass before it (without FINAL) hands on.
+// Outputs of a filter pass. The last pass (FINAL) writes the node's outputs at full size, all others write their value
+// for the next pass.
 #include "value.glsl"
 #ifdef FINAL
 #ifdef WRITES_OCCLUSION
@@ -11,29 +12,30 @@ out vec4 bent_normal;  // world space
 out vec4 indirect;
 #endif
 #else
-out Value mean;
+out Value filtered;
 #endif
 
 #if defined(FINAL) && defined(WRITES_OCCLUSION) && defined(MULTI_BOUNCE)
 uniform float albedo;
 
-// What light between surfaces of one albedo leaves of an occlusion (J. Jimenez et al., 2016: a fit to path tracing).
-float brightened(float open) {
+// Ambient visibility with interreflection between surfaces of one albedo (J. Jimenez et al., 2016: a fit to path
+// tracing).
+float multi_bounce(float visibility) {
     float a = 2.0404 * albedo - 0.3324;
     float b = -4.7951 * albedo + 0.6417;
     float c = 2.7552 * albedo + 0.6903;
-    return max(open, ((a * open + b) * open + c) * open);
+    return max(visibility, ((a * visibility + b) * visibility + c) * visibility);
 }
 #endif
 
-void finish(Value value) {
+void write_outputs(Value value) {
 #ifdef FINAL
-    float open = openness(value);
+    float visibility = ambient_visibility(value);
 #ifdef WRITES_OCCLUSION
 #ifdef MULTI_BOUNCE
-    occlusion = brightened(clamp(open, 0.0, 1.0));
+    occlusion = multi_bounce(clamp(visibility, 0.0, 1.0));
 #else
-    occlusion = open;
+    occlusion = visibility;
 #endif
 #endif
 #ifdef WRITES_BENT_NORMAL
@@ -43,6 +45,6 @@ void finish(Value value) {
     indirect = vec4(value.xyz, 1.0);
 #endif
 #else
-    mean = value;
+    filtered = value;
 #endif
 }

@@ -1,4 +1,4 @@
-"""What the techniques share that find occlusion and light between surfaces in one pass."""
+"""Shared by techniques that compute occlusion and indirect light in one pass."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from rendergraph.api import Occlusion, Output, Port, Steps, param
 from ._interreflection import Interreflection
 
 
-class Combined(Interreflection):
+class OcclusionAndLight(Interreflection):
     """Base of the techniques with one set of samples for both.
 
-    Occlusion comes after the lighting here, for light is looked for where it is: these nodes add ambient light
-    themselves, and the lighting's own is to be 0.
+    Indirect light needs the lit picture, so occlusion comes too late for the lighting node. These nodes add ambient
+    light themselves, and that of the lighting node must be 0.
     """
 
     occlusion = Output(Occlusion, format="r16", size="depth", doc="1 open, 0 closed; 1 where nothing is.")
@@ -23,8 +23,10 @@ class Combined(Interreflection):
         default=0.03, min=0, glsl="vec3", doc="Radiance from all sides, a number or RGB, scaled by the occlusion."
     )
 
-    def look_at_both(self, steps: Steps, fragment: str, defines: Mapping[str, int]) -> None:
-        """Light and occlusion by a shader, then what is made of it."""
+    def record_both(self, steps: Steps, fragment: str, defines: Mapping[str, int]) -> None:
+        """Record the shader that computes both, and the reflection of light."""
         out: dict[str, Port] = {"indirect": self.indirect, "occlusion": self.occlusion}
-        self.look(steps, fragment, out, four=True, smooth=self.denoise, defines=defines, diffuse=self.diffuse)
-        self.send_on(steps, occlusion=self.occlusion, defines={"AMBIENT": 1})
+        self.sample_and_filter(
+            steps, fragment, out, has_vector=True, denoise_passes=self.denoise, defines=defines, diffuse=self.diffuse
+        )
+        self.reflect_indirect(steps, occlusion=self.occlusion, defines={"AMBIENT": 1})
