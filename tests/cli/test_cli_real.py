@@ -93,7 +93,7 @@ def test_a_picture_that_says_nothing_is_told(cli: Any) -> None:
     cli("run", "forward", *SMALL, "-o", "a.jpg")
     result = cli("config", "a.jpg")
     assert result.code == 3
-    assert result.err.startswith("a.jpg: RG510 the picture does not say how it was made")
+    assert result.err.startswith("a.jpg: RG510 the picture has no pipeline in its metadata")
     assert cli("config", "none.png").err == "none.png: RG350 the image does not exist\n"
 
 
