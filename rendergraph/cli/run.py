@@ -214,7 +214,7 @@ def _draw(
     moving = [target for target in targets if is_film(target.path)]
     progress = Progress(len(expanded.options.frames))
     frame: Frame | None = None
-    unsound: dict[str, Problem] = {}
+    suspect: Frame | None = None
     with films([target.path for target in moving], expanded.options.fps, expanded.options.frames[0]) as open_films:
         for done, frame in enumerate(stages.draw(expanded, gpu), start=1):
             files = [
@@ -234,14 +234,14 @@ def _draw(
                 if not quiet:
                     emit(str(file.path))
             progress.show(done)
-            unsound = {**frame.unsound, **unsound}  # once for each output: of its first frame
+            suspect = suspect or (frame if frame.is_suspect else None)
     progress.clear()
     for target in moving:
         written.append(str(target.path))
         if not quiet:
             emit(str(target.path))
     assert frame is not None  # a range of frames is never empty
-    warnings.say([*frame.warnings, *unsound.values()])
+    warnings.say([*frame.warnings, *(stages.not_finite_warnings(suspect, expanded, gpu) if suspect else ())])
     return frame.as_json() | {"outputs": written}
 
 
@@ -313,7 +313,7 @@ def draw_in_parts(
     wanted = [FrameFile(t.name, "" if is_film(t.path) else t.path.suffix, t.is_tap) for t in targets]
     chunks = split_frames(expanded, wanted, farm.workers, None if said is None else int(said.plain()))
     frames, written = expanded.options.frames, dict[int, list[str]]()
-    progress, lasts, unsound = Progress(len(frames)), list["Frame"](), dict[int, Any]()
+    progress, lasts = Progress(len(frames)), list["Frame"]()
     with films([t.path for t in targets if is_film(t.path)], expanded.options.fps, frames[0]) as open_films:
         for shown in render_chunks(farm, chunks):
             if not isinstance(shown, RenderedFrame):
@@ -330,14 +330,12 @@ def draw_in_parts(
                 if not quiet:
                     progress.clear()
                     emit(str(path))
-            unsound[shown.number] = dict(shown.unsound)
             progress.show(len(written))
             if quiet:
                 say_event({"event": "frame", "frame": shown.number, "done": len(written), "of": len(frames)})
     progress.clear()
     lasts.sort(key=lambda frame: frame.number)
-    first = {name: problem for number in sorted(unsound, reverse=True) for name, problem in unsound[number].items()}
-    warnings.say([*(problem for frame in lasts for problem in frame.warnings), *first.values()])
+    warnings.say([problem for frame in lasts for problem in frame.warnings])
     whole = dataclasses.replace(lasts[-1], times=tuple(times for frame in lasts for times in frame.times))
     for path in open_films:
         if not quiet:

@@ -44,7 +44,6 @@ class RenderedFrame:
 
     number: int
     files: tuple[bytes | npt.NDArray[Any], ...]
-    unsound: tuple[tuple[str, Problem], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,13 +64,15 @@ class FrameChunk(Task):
         """Yield each frame, and then the last one without its pictures, for its times."""
         pipeline = Pipeline(relocate_selection(self.selection, worker.root))
         expanded = stages.expand(pipeline.link(), self.options)
-        frame: Frame | None = None
+        frame = suspect = None
         for frame in stages.draw(expanded, worker.gpu, lead=self.lead):
             files = tuple(_encode(frame, file) for file in self.files)
-            yield RenderedFrame(frame.number, files, tuple(frame.unsound.items()))
+            suspect = suspect or (frame if frame.is_suspect else None)
+            yield RenderedFrame(frame.number, files)
         assert frame is not None  # a chunk has one at least
+        warnings = stages.not_finite_warnings(suspect, expanded, worker.gpu) if suspect else ()
         figures = {name: array for name, array in frame.arrays.items() if array.shape[:-1] == (1, 1)}
-        yield replace(frame, arrays=figures)
+        yield replace(frame, arrays=figures, warnings=(*frame.warnings, *warnings))
 
 
 def _encode(frame: Frame, file: FrameFile) -> bytes | npt.NDArray[Any]:

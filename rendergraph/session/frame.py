@@ -54,6 +54,15 @@ def not_finite(pixels: npt.NDArray[Any], semantic: str) -> int:
     return 0 if sound.all() else int((~sound).any(axis=-1).sum())
 
 
+def drawn_as_nan(pixels: npt.NDArray[Any], semantic: str) -> int:
+    """Return the number of 8-bit display colours that are magenta, as output transforms write NaN."""
+    import numpy as np  # a session is imported without it
+
+    if pixels.dtype != np.uint8 or semantic != "display_color" or pixels.shape[-1] != 4:
+        return 0
+    return int((pixels.view("<u4") == 0xFFFF00FF).sum())
+
+
 def figures_of(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, float | list[float]]:
     """Return the outputs of one texel, each as a number, or as a list of its channels."""
     found: dict[str, float | list[float]] = {}
@@ -143,6 +152,11 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
         from rendergraph.execute import summary
 
         return summary([time.frame_ms for time in self.times])
+
+    @property
+    def is_suspect(self) -> bool:
+        """Whether an output holds NaN or infinity, or may have been made from NaN."""
+        return bool(self.unsound) or any(drawn_as_nan(a, self.infos[name].semantic) for name, a in self.arrays.items())
 
     @cached_property
     def unsound(self) -> Mapping[str, Problem]:

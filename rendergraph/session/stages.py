@@ -23,11 +23,11 @@ import rendergraph.resolve
 import rendergraph.schedule
 from rendergraph.catalog import Catalog
 from rendergraph.document import Document, YamlLimits
-from rendergraph.errors import InputError, Option, Place, Problem
+from rendergraph.errors import InputError, Option, Place, Problem, RendergraphError
 from rendergraph.scene.animate import complete
 from rendergraph.scene.facts import environment_facts, light_facts, object_facts
 from rendergraph.scene.model import Scene
-from rendergraph.session.outputs import requested_outputs
+from rendergraph.session.outputs import every_port, requested_outputs
 from rendergraph.session.picture_metadata import PictureMetadata, is_picture, read_picture_metadata
 from rendergraph.session.scenes import scene_of
 from rendergraph.session.selection import RenderOptions, Selection
@@ -35,6 +35,7 @@ from rendergraph.session.values import Expanded, Linked, Planned, Resolved
 from rendergraph.settings import Roots
 
 if TYPE_CHECKING:
+    from rendergraph.scene.model import Camera
     from rendergraph.session.drawing import Drawing
     from rendergraph.session.frame import Frame
     from rendergraph.session.gpu import Gpu
@@ -182,6 +183,43 @@ def draw(expanded: Expanded, gpu: Gpu, lead: int | None = None) -> Iterator[Fram
             drawing.draw(number)
             frame = drawing.read()
         yield frame
+
+
+def not_finite_warnings(frame: Frame, expanded: Expanded, gpu: Gpu, camera: Camera | None = None) -> list[Problem]:
+    """Return warnings about NaN and infinity in a frame's outputs, which name the port that held them first.
+
+    A suspect frame is rendered again with all ports tapped, so call this when no other frame is needed.
+    """
+    import numpy as np  # for such frames alone
+
+    from rendergraph.session.frame import drawn_as_nan, not_finite
+
+    if not frame.is_suspect:
+        return []
+    options = replace(expanded.options, warm_up=False, timed=False)
+    taps = every_port(plan(expand(expanded.linked, options)))
+    try:
+        with gpu.current():
+            drawing = compile(expand(expanded.linked, replace(options, taps=taps)), gpu)
+            drawing.begin()
+            drawing.draw(frame.number, camera)
+            tapped = drawing.read()
+    except RendergraphError:  # the taps may need more memory than there is
+        return list(frame.unsound.values())
+    held = [tap for tap in taps if not_finite(tapped[tap], tapped.infos[tap].semantic)]
+    first = next((tap for tap in held if np.isnan(tapped[tap]).any()), held[0] if held else "")
+    if not first:
+        return list(frame.unsound.values())
+    found = []
+    for name, pixels in frame.arrays.items():
+        info = frame.infos[name]
+        if count := not_finite(pixels, info.semantic) or drawn_as_nan(pixels, info.semantic):
+            magenta = " (drawn in magenta)" if pixels.dtype == np.uint8 else ""
+            port = "" if info.port == name else f" ({info.port})"
+            text = f"{count} of {pixels.size // pixels.shape[-1]} pixels of '{name}'{port} are NaN or infinite{magenta}"
+            text += f"; the first texture with such texels is '{first}'; run … --tap-all FOLDER shows all textures"
+            found.append(Problem("RG619", text, Place(frame.pipeline), severity="warning"))
+    return found
 
 
 def draw_last(expanded: Expanded, gpu: Gpu, progress: Progress | None = None) -> Frame:

@@ -110,7 +110,10 @@ class RenderService:
             finally:
                 self._files = {**self._files, **files}
         self._rendered, frame = rendered, rendered.frame
-        picture = rendered.display()
+        picture, warnings = rendered.display(), frame.warnings
+        if request.still:
+            drawing = rendered.drawing
+            warnings += tuple(stages.not_finite_warnings(frame, drawing.expanded, self._gpu, drawing.camera))
         facts: dict[str, Any] = {
             "size": [picture.shape[1], picture.shape[0]],
             "number": frame.number,
@@ -119,7 +122,7 @@ class RenderService:
             "frame_ms": frame.frame_ms["median"],
             "device": dict(frame.device),
             "still": request.still,
-            "warnings": [problem.as_json() for problem in frame.warnings],
+            "warnings": [problem.as_json() for problem in warnings],
         }
         if request.still:
             facts["texture"] = texture_statistics(rendered.pixels, rendered.info)

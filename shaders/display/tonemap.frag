@@ -28,12 +28,17 @@ void main() {
     scale *= texelFetch(gain, ivec2(0), 0).r;
 #endif
     vec3 sum = vec3(0.0);
+    bool broken = false;
     for (int i = 0; i < RADIANCE_SAMPLES; ++i) {
-        vec3 scene = max(texelFetch(radiance, ivec2(gl_FragCoord.xy), i).rgb, 0.0) * scale;
+        vec3 light = texelFetch(radiance, ivec2(gl_FragCoord.xy), i).rgb;
+        broken = broken || any(isnan(light));
+        vec3 scene = max(light, 0.0) * scale;
         sum += clamp(tone_curve(min(scene, 1e9)), 0.0, 1.0);
     }
     color = vec4(linear_to_srgb(sum / float(RADIANCE_SAMPLES)), 1.0);
 #if DITHER
     color.rgb += (interleaved_gradient_noise(gl_FragCoord.xy) - 0.5) * (0.998 / 255.0);  // whole steps stay so
 #endif
+    if (broken)
+        color.rgb = vec3(1.0, 0.0, 1.0);  // NaN is seen, and found in the picture
 }

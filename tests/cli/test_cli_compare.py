@@ -100,6 +100,25 @@ def test_pictures_with_nan_are_told_and_never_win(cli: Any, tmp_path: Path) -> N
     assert [run["not_finite"] for run in again.json["runs"]] == [0, 6]
 
 
+def test_nan_is_magenta_in_a_png_and_its_first_texture_is_named(cli: Any, tmp_path: Path) -> None:
+    from rendergraph.images import read
+
+    (tmp_path / "broken.frag").write_text(BROKEN)
+    (tmp_path / "p.yaml").write_text(
+        "rendergraph: 1\nsize: [16, 8]\nnodes:\n  a: {type: broken}\n"
+        "  blur: {type: gaussian_blur, inputs: {source: a.light}, params: {radius: 1}}\n"
+        "  display: {type: tonemap, inputs: {radiance: blur.blurred}}\noutputs: {image: display.color}\n"
+    )
+    clean = cli("run", "p.yaml", "--plugin", "broken.frag", "-o", "a.png")
+    assert "RG619" not in clean.err
+    found = cli("run", "p.yaml", "--plugin", "broken.frag", "-s", "a.much=-1", "-o", "a.png")
+    assert "RG619 12 of 128 pixels of 'image' (display.color) are NaN or infinite (drawn in magenta)" in found.err
+    assert "the first texture with such texels is 'a.light'" in found.err
+    magenta = (read(tmp_path / "a.png") == (255, 0, 255)).all(axis=-1)
+    assert magenta[-3:, :4].all()
+    assert magenta.sum() == 12
+
+
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [

@@ -201,6 +201,20 @@ def test_a_moving_picture_is_rendered_smaller_where_that_takes_long(gl: rg.Sessi
     assert slow.answer(RenderRequest(FORWARD, still=False)).facts["size"] == [16, 9]
 
 
+def test_nan_is_told_with_the_first_texture_that_holds_it(service: RenderService, tmp_path: Path) -> None:
+    (tmp_path / "nan.frag").write_text(
+        "/*---\ndoc: NaN.\noutputs: {light: {semantic: radiance, doc: Light.}}\n---*/\n"
+        "uniform float zero;\nout vec4 light;\n\nvoid main() {\n    light = vec4(zero / zero);\n}\n"
+    )
+    (tmp_path / "nan.yaml").write_text(
+        "rendergraph: 1\nsize: [4, 4]\nnodes:\n  a: {type: ./nan.frag, params: {zero: 0}}\n"
+        "  display: {type: tonemap, inputs: {radiance: a.light}}\noutputs: {image: display.color}\n"
+    )
+    (warning,) = service.answer(RenderRequest(rg.Selection(str(tmp_path / "nan.yaml")))).facts["warnings"]
+    assert warning["code"] == "RG619"
+    assert "the first texture with such texels is 'a.light'" in warning["text"]
+
+
 def test_exposure_is_of_light_alone(service: RenderService, tmp_path: Path) -> None:
     plain = picture(service.answer(RenderRequest(FORWARD, port="light.radiance")), tmp_path).astype(float)
     brighter = picture(service.answer(RenderRequest(FORWARD, port="light.radiance", exposure=2.0)), tmp_path)

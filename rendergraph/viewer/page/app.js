@@ -74,7 +74,7 @@ function showFigures() {
 }
 
 function showProblems(extra = []) {
-  const all = [...problems, ...extra];
+  const all = [...problems, ...(picture?.warnings ?? []), ...extra];
   $("problems").hidden = all.length === 0;
   $("problems").replaceChildren(...all.map(({ file, line, column, code, text }) => {
     const place = file ? `${file}${line ? `:${line}:${column}` : ""}: ` : "";
@@ -100,6 +100,7 @@ on("picture", (facts, files) => {
   history.push({ ms: facts.frame_ms, passes: facts.passes.filter((pass) => pass.ran) });
   if (history.length > 100) history.shift();
   showFrame(facts.frame);
+  showProblems();
   showPicture(facts, files);
   showFigures();
   if (!facts.still) return;
