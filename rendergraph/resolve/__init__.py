@@ -143,11 +143,11 @@ def _complete(tree: Value, files: Files) -> None:
         if not entries(tree, part) and not files.problems:
             text = f"the pipeline has no {part}; add {part}: {example}"
             empty = tree.get(part)
-            files.say(tree.problem("RG125", text) if empty is None else empty.problem("RG125", text, key=True))
+            files.report(tree.problem("RG125", text) if empty is None else empty.problem("RG125", text, key=True))
     for name, declared in entries(tree, "inputs").items():
         if not flag(declared, "optional"):
             text = f"input '{name}' comes from outside: this file is a sub-pipeline and cannot be run"
-            files.say(declared.problem("RG124", text, key=True))
+            files.report(declared.problem("RG124", text, key=True))
 
 
 def _size(tree: Value, files: Files) -> tuple[int, int]:
@@ -171,7 +171,7 @@ def _scene(tree: Value, files: Files, typed: str | Path | None) -> tuple[Path | 
         found: tuple[Path, Roots] | None = (path, roots)
         resolved = Roots((*roots.folders, path.resolve().parent)).mistake(path, str(typed))
         if resolved:
-            files.say(value.problem(*resolved))
+            files.report(value.problem(*resolved))
             found = None
     else:
         found = files.locate(value, shipped_scenes(), "scene")

@@ -23,7 +23,7 @@ class Files:
     """Reads and merges files, each once; collects problems."""
 
     def __init__(self, catalog: Catalog, asset_roots: Sequence[Path], limits: YamlLimits) -> None:
-        self.plugins = Plugins(catalog, self.say)
+        self.plugins = Plugins(catalog, self.report)
         self.asset_roots = [Path(root) for root in asset_roots]
         self.limits = limits
         self.problems: list[Problem] = []
@@ -38,7 +38,7 @@ class Files:
     def catalog(self) -> Catalog:
         return self.plugins.catalog
 
-    def say(self, problem: Problem) -> None:
+    def report(self, problem: Problem) -> None:
         self.problems.append(problem)
         if len(self.problems) >= MOST_PROBLEMS:
             raise InputError(self.problems)
@@ -82,12 +82,12 @@ class Files:
                 hint = "; it is a pipeline"
             elif next(self.beside(value).parent.glob(f"{text}.*"), None):
                 hint = "; a file beside this one is named with its extension"
-            self.say(value.problem("RG015", f"there is no shipped {what} '{text}'{hint}"))
+            self.report(value.problem("RG015", f"there is no shipped {what} '{text}'{hint}"))
             return None
         roots = self.typed_roots(value)
         mistake = roots.mistake(path := self.beside(value), text)
         if mistake:
-            self.say(value.problem(*mistake))
+            self.report(value.problem(*mistake))
             return None
         return path, roots
 

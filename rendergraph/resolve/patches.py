@@ -153,6 +153,10 @@ def _port_of(node: str, key: str, link: Value) -> str | None:
     return (port or key) if source == node else None
 
 
+_NODE_KEYS: dict[str, tuple[Any, str]] = {
+    "type": (str, "the name of a node type"),
+    "enabled": (bool | None, "true or false"),
+}
 _ID = "[A-Za-z_][A-Za-z0-9_-]*"
 _PATH = rf"((?:{_ID}/)*)(?:({_ID})\.)?({_ID})\Z"
 
@@ -225,7 +229,6 @@ def patch_of(tree: Value, wanted: Sequence[Setting], names_of: NamesOf) -> tuple
     root = Value({}, wanted[0].value.source)
     nodes = entries(tree, "nodes")
     parameters = entries(tree, "parameters")
-    types: dict[str, Value] = {}
     known = []
     for setting in wanted:
         if setting.node is None:
@@ -236,46 +239,35 @@ def patch_of(tree: Value, wanted: Sequence[Setting], names_of: NamesOf) -> tuple
         elif setting.node not in nodes:
             text = f"there is no node '{setting.node}'{suggestion(setting.node, nodes)}"
             problems.append(setting.problem("RG109", text))
-        elif setting.name == "type":
-            if isinstance(setting.value.data, str):
-                types[setting.node] = setting.value
-                _put(root, setting.value, "nodes", setting.node, "type")
+        elif setting.name in _NODE_KEYS:
+            expected, words = _NODE_KEYS[setting.name]
+            if isinstance(setting.value.data, expected):
+                _put(root, setting.value, "nodes", setting.node, setting.name)
             else:
-                text = f"'{setting.text}': expected the name of a node type, got {setting.value.kind}"
-                problems.append(setting.problem("RG106", text))
-        elif setting.name == "enabled":
-            if isinstance(setting.value.data, bool | None):
-                _put(root, setting.value, "nodes", setting.node, "enabled")
-            else:
-                text = f"'{setting.text}': expected true or false, got {setting.value.kind}"
+                text = f"'{setting.text}': expected {words}, got {setting.value.kind}"
                 problems.append(setting.problem("RG106", text))
         else:
             known.append(setting)
     for setting in known:
         assert setting.node is not None
         node = nodes[setting.node]
-        new_type = types.get(setting.node) or node.get("type")
+        new_type = root.get("nodes", setting.node, "type") or node.get("type")
         names = names_of(new_type) if new_type is not None else None
         if names is None:
             continue  # a type that does not exist is said once, at the type
-        part = _part(setting, names)
-        if part is None:
+        if setting.name not in names.params | names.inputs:
             choices = sorted(names.params | names.inputs)
             word = new_type.data if new_type is not None and isinstance(new_type.data, str) else "sub-pipeline"
             text = f"node '{setting.node}' ({word}) has no param or input '{setting.name}'"
             problems.append(setting.problem("RG103", text + suggestion(setting.name, choices)))
-        elif part == "inputs" and not _is_link(setting.value):
+        elif setting.name in names.params:
+            _put(root, setting.value, "nodes", setting.node, "params", setting.name)
+        elif not _is_link(setting.value):
             text = f"'{setting.text}': expected a link as in 'node.port', a list of links, or null"
             problems.append(setting.problem("RG106", text))
         else:
-            _put(root, setting.value, "nodes", setting.node, part, setting.name)
+            _put(root, setting.value, "nodes", setting.node, "inputs", setting.name)
     return root, problems
-
-
-def _part(setting: Setting, names: TypeNames) -> str | None:
-    if setting.name in names.params:
-        return "params"
-    return "inputs" if setting.name in names.inputs else None
 
 
 def _is_link(value: Value) -> bool:

@@ -29,17 +29,17 @@ class Plugins:
         written: the entries of `plugins` in the resolved file, by text.
     """
 
-    def __init__(self, catalog: Catalog, say: Callable[[Problem], None]) -> None:
+    def __init__(self, catalog: Catalog, report: Callable[[Problem], None]) -> None:
         self.catalog = catalog
         self.missing: list[str] = []
         self.unrun: dict[str, str] = {}
         self.written: dict[str, Value] = {}
         self.notes: list[Problem] = list(catalog.notes)
-        self._say = say
+        self._report = report
         self._home = Path.cwd()
         self._roots = Roots(())
         self._seen: set[Path] = set()
-        self._told: set[tuple[str, Place]] = set()
+        self._reported: set[tuple[str, Place]] = set()
 
     def start(self, home: Path, roots: Roots) -> None:
         """Set the folder of the resolved file: paths in it are relative to that."""
@@ -61,15 +61,15 @@ class Plugins:
     def add(self, value: Value, folder: Path, roots: Roots) -> None:
         """Add one entry of `plugins`; `folder` is its path joined to the folder of its file."""
         text = str(value.data)
-        if (text, value.place) in self._told:
+        if (text, value.place) in self._reported:
             return
-        self._told.add((text, value.place))
+        self._reported.add((text, value.place))
         if is_name(text):
             self._package(value, text)
             return
         mistake = roots.mistake(folder, text, folder=True)
         if mistake:
-            self._say(value.problem(*mistake))
+            self._report(value.problem(*mistake))
             return
         folder = folder.resolve()
         self.written.setdefault(self.spelled(folder), value)
@@ -79,25 +79,25 @@ class Plugins:
 
     def _package(self, value: Value, name: str) -> None:
         if not re.match(_PACKAGE, name):  # what is said is typed into a shell
-            self._say(value.problem("RG131", f"'{shown(name)}' is neither a folder of plugins nor a package's name"))
+            self._report(value.problem("RG131", f"'{shown(name)}' is neither a folder of plugins nor a package's name"))
             return
         self.written.setdefault(name, value)
         # While it is being written, its folder is named and it is not installed.
         if version(name) is None and name not in self.missing and not self.catalog.has_plugin(name):
             self.missing.append(name)
             text = f"the pipeline needs the plugin '{name}', which is not installed: pip install {name}"
-            self._say(value.problem("RG130", text))
+            self._report(value.problem("RG130", text))
 
     def _shaders(self, value: Value, text: str, folder: Path, roots: Roots) -> None:
         try:
             found, python = find.shaders(folder)
         except ValueError as error:
-            self._say(value.problem("RG131", f"'{shown(text)}' is not a folder of plugins: {error}"))
+            self._report(value.problem("RG131", f"'{shown(text)}' is not a folder of plugins: {error}"))
             return
         outside = [one.file for _, one in found if roots.mistake(one.file)]
         for file in outside:
             code, reason = roots.mistake(file, str(file.relative_to(folder))) or ("RG012", "")
-            self._say(value.problem(code, f"of plugin '{shown(text)}' {reason}"))
+            self._report(value.problem(code, f"of plugin '{shown(text)}' {reason}"))
         self.catalog = self.catalog.with_shaders((name, one) for name, one in found if one.file not in outside)
         strange = [file for file in python if file not in self.catalog.files()]
         if strange:
