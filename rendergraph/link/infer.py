@@ -13,45 +13,18 @@ from typing import Annotated, Any, NoReturn, Optional
 import msgspec
 
 from rendergraph import textures
-from rendergraph.declare import (
-    Facts,
-    Function,
-    InOut,
-    Input,
-    Node,
-    Port,
-    Texel,
-    TextureInfo,
-    Views,
-    WrittenPort,
-)
+from rendergraph.declare import Facts, Function, InOut, Input, Node, Port, Texel, TextureInfo, Views, WrittenPort
 from rendergraph.declare.blame import author_problem
 from rendergraph.document import shown
 from rendergraph.errors import Problem, SceneError, is_interruption, node_named
 from rendergraph.link.graph import Endpoint
 from rendergraph.link.nodes import UnlinkedNode
 from rendergraph.ports import Count, FormatName, Positive, Samples, Sides
-from rendergraph.textures import (
-    MOST_SIDE,
-    Albedo,
-    Depth,
-    Emissive,
-    Filter,
-    LinearDepth,
-    Material,
-    Normal,
-    Radiance,
-    Sampler,
-    Semantic,
-    ShadowMap,
-    TextureDesc,
-    View,
-    full_mip_count,
-)
+from rendergraph.textures import MOST_SIDE, Filter, Sampler, Semantic, TextureDesc, full_mip_count
 from rendergraph.typecheck import fits, quoted, words_for
 
 CAMERA = "camera"
-_DRAWN = {s.name for s in (Albedo, Depth, Emissive, LinearDepth, Material, Normal, Radiance, ShadowMap)}
+_DRAWN = {"albedo", "depth", "emissive", "linear_depth", "material", "normal", "radiance", "shadow_map"}
 DEFAULT_FORMAT = "rgba16f"
 _LIGHTS = Annotated[Sequence[Count], "the indices of lights"]
 # pyright knows no `|` of Annotated
@@ -191,7 +164,7 @@ class TextureInference:
             lights = self._view_lights(end, port)
             if count is None:
                 count = len(lights) if port.lights else 1
-            return TextureInfo(None, View, view=str(end), lights=lights, views=count)
+            return TextureInfo(None, textures.View, view=str(end), lights=lights, views=count)
         if isinstance(port, InOut) and draft.links.get(port.name):
             return self.info(draft.links[port.name][0].source)
         return self._made(end, draft, port) if isinstance(port, WrittenPort) else None

@@ -146,9 +146,10 @@ def unknown_type(spec: PipelineSpec, catalog: Catalog, name: str) -> str:
 
 def stand_in(spec: PipelineSpec, node: NodeSpec) -> NodeType:
     """Return a type with all inputs and outputs that the file uses; it can be shown, not run."""
-    taken = {name: Input(AnyTexture, optional=True, many=_is_list(value)) for name, value in node.inputs.items()}
-    made = {name: Output(AnyTexture) for name in _asked_of(spec, node.id)}
-    ports = {name: port for name, port in {**taken, **made}.items() if not hasattr(Node, name)}
+    lists = {name: isinstance(value.data, list) for name, value in node.inputs.items()}
+    inputs = {name: Input(AnyTexture, optional=True, many=many) for name, many in lists.items()}
+    outputs = {name: Output(AnyTexture) for name in _outputs_used(spec, node.id)}
+    ports = {name: port for name, port in {**inputs, **outputs}.items() if not hasattr(Node, name)}
     params = {
         name: Parameter("structural", None, type=Any)
         for name in node.params
@@ -159,16 +160,12 @@ def stand_in(spec: PipelineSpec, node: NodeSpec) -> NodeType:
     return NodeType(node.type, "", cls, Path(), Path(), "", missing=True)
 
 
-def _is_list(value: Value) -> bool:
-    return isinstance(value.data, list)
-
-
-def _asked_of(spec: PipelineSpec, wanted: str) -> list[str]:
+def _outputs_used(spec: PipelineSpec, id: str) -> list[str]:
     found: dict[str, None] = {}
     for scope, name, value in _links(spec):
         for part in value.data if isinstance(value.data, list) else [value]:
             match = _LINK.match(part.data) if isinstance(part.data, str) else None
-            if match is not None and f"{scope}{match[1]}" == wanted:
+            if match is not None and f"{scope}{match[1]}" == id:
                 found[match[2] or name] = None
     return list(found)
 

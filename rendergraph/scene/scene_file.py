@@ -21,18 +21,7 @@ from rendergraph.scene import scene_keys, scene_values
 from rendergraph.scene.environments import named
 from rendergraph.scene.geometry import rigid
 from rendergraph.scene.mesh_files import MESHES, read_mesh
-from rendergraph.scene.model import (
-    Camera,
-    Environment,
-    Light,
-    Material,
-    Mesh,
-    Object,
-    Orbit,
-    Placement,
-    Scene,
-    Texture,
-)
+from rendergraph.scene.model import Camera, Environment, Light, Material, Mesh, Object, Orbit, Placement, Scene, Texture
 from rendergraph.scene.reading import Reading
 from rendergraph.scene.shapes import SHAPES, ShapePart, build
 
