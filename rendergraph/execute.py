@@ -176,7 +176,7 @@ class Runner(Struct, eq=False):
     def reset(self) -> None:
         """Start history afresh: all of it holds the port's first value."""
         self.drawn, self._seen = 0, None
-        self.executable.forget_updates()
+        self.executable.reset_updates()
         memory, plan = self.executable.memory, self.executable.plan
         for name, places in plan.placement.items():
             resource = plan.resources[name]
@@ -220,14 +220,14 @@ class Runner(Struct, eq=False):
                 values.compute()
         if stale:
             executable.computed(stale)
-        executable.updated()
+        executable.end_updates()
         if not self._complete:
             self._check_views()
         if not self.drawn:
             views.advance()  # nothing has moved before the first frame
         self.drawn += 1
         if views.changed or moved:
-            executable.arrange(moved=moved, cull=self.cull)
+            executable.cull_and_sort(moved=moved, cull=self.cull)
             executable.touched |= {("view", table) for table in views.changed}
             views.changed.clear()
         if views.moved_before:
@@ -241,7 +241,7 @@ class Runner(Struct, eq=False):
         if fresh or len(executable.binds) > 1:  # else everything is still bound from the frame before
             for call in executable.binds[parity]:
                 call()
-        listed = executable.next(parity, reuse=self.reuse)
+        listed = executable.steps_for_frame(parity, reuse=self.reuse)
         self.ran = len(listed)
         taken: list[tuple[Step, float, Timer]] = []
         measured = executable.device.can_time
@@ -260,9 +260,9 @@ class Runner(Struct, eq=False):
                 node_id = step.step.node
                 taken.append((step.step, perf_counter() - before + updates.pop(node_id, 0.0), step.timer))
         except BaseException:
-            executable.break_off()
+            executable.abort()
             raise
-        executable.done()
+        executable.end_frame()
         if not timed:
             return None
         executable.device.ctx.finish()
@@ -321,7 +321,7 @@ class Runner(Struct, eq=False):
         """Raise what the driver has complained about since the last check."""
         error = self.executable.device.raw.error()
         if error:
-            self.executable.renew()
+            self.executable.invalidate()
             raise RenderError(Problem("RG614", f"the driver reported {error} while drawing"))
 
     def read(self, resource: str, *, mip: int = 0, layer: int | None = None, stencil: bool = False) -> npt.NDArray[Any]:

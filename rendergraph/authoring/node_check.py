@@ -215,7 +215,7 @@ class NodeCheck:
                 for parity in range(memory.parities):
                     for call in memory.clear(name, parity, value):
                         call()
-        executable.renew()  # persistent textures were filled, too
+        executable.invalidate()  # persistent textures were filled, too
         runner.reset()
         scene = linked.scene
         camera = view_matrices(next(iter(scene.cameras.values())), linked.graph.size)

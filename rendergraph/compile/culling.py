@@ -77,7 +77,7 @@ class DrawList(Struct, eq=False):
     changed: Callable[[Objects], object] | None = None
     drawn: Objects = field(default_factory=lambda: np.zeros(0, np.int64))
 
-    def arrange(self, visible: Bools | None, depths: Doubles) -> None:
+    def update(self, visible: Bools | None, depths: Doubles) -> None:
         """Draw what is visible, of equally far objects the scene's first one first."""
         objects = self.objects if visible is None else self.objects[visible[self.objects]]
         if self.order != "scene":
@@ -105,7 +105,7 @@ class SceneView(Struct, eq=False):
     clamped: bool
     lists: list[DrawList] = field(default_factory=list)
 
-    def arrange(self, packed: PackedScene, views: ViewBuffers, *, cull: bool) -> None:
+    def cull_and_sort(self, packed: PackedScene, views: ViewBuffers, *, cull: bool) -> None:
         """Bring all lists to what is seen now, in the order of its distance along the view's axis."""
         table = views.current[self.table]
         chosen = table if self.index is None else (table[self.index],)
@@ -114,4 +114,4 @@ class SceneView(Struct, eq=False):
             visible = np.logical_or.reduce([seen(packed, view, clamped=self.clamped) for view in chosen])
         depths = -(packed.centers @ chosen[0].view[2, :3] + chosen[0].view[2, 3])
         for each in self.lists:
-            each.arrange(visible, depths)
+            each.update(visible, depths)

@@ -125,14 +125,14 @@ class Executable(Struct, eq=False, dict=True):
         lists: what the next frame runs, a list a parity; filled by `assemble`.
         due: kept steps that the next frame runs.
         scene_views: which objects are drawn, and in what order; asked when a view or an object has moved.
-        filled: what `update` has written into buffers.
-        filled_before: the buffers among them that this drawing has not written yet.
-        touched: the sources that have changed since the last frame, as `_looks` names them, but for the scene's.
+        contents: what `update` has written into buffers.
+        stale: the buffers among them that this drawing has not written yet.
+        touched: the sources that have changed since the last frame, except the scene's.
         buffers: draw commands.
         uploads: values that the CPU gives textures and buffers, by the steps that upload them.
         vertex_arrays: frees the vertex arrays over the plan's own buffers.
         fresh: `statics` have to be written and everything bound before the next frame.
-        looks_back: a program looks at where things were in the frame before.
+        uses_previous: a program looks at where things were in the frame before.
         shares_kept: what they make may be taken over from other pipelines, and by those.
     """
 
@@ -153,19 +153,19 @@ class Executable(Struct, eq=False, dict=True):
     uploads: Mapping[StepKey, UploadedValues] = field(default_factory=dict)
     vertex_arrays: Call = bool
     fresh: bool = True
-    looks_back: bool = False
+    uses_previous: bool = False
     made_kept: bool = False
     shares_kept: bool = True
-    filled: dict[str, bytes] = field(default_factory=dict)
-    filled_before: set[str] = field(default_factory=set)
+    contents: dict[str, bytes] = field(default_factory=dict)
+    stale: set[str] = field(default_factory=set)
     touched: set[Source] = field(default_factory=set)
     _steady: list[list[FrameStep]] = field(default_factory=list)
     _parts: dict[tuple[int, tuple[int, ...]], list[FrameStep]] = field(default_factory=dict)
     _seen: Mapping[str, int] = field(default_factory=dict)
-    _begun: bool = False
+    _running: bool = False
 
     def __post_init__(self) -> None:
-        self.reuse = Reuse(self.plan, self._looks)
+        self.reuse = Reuse(self.plan, self._step_sources)
 
     @cached_property
     def kept(self) -> dict[StepKey, Step]:
@@ -178,48 +178,48 @@ class Executable(Struct, eq=False, dict=True):
     def programs(self) -> set[Program]:
         return {draw.program for steps in self.steps for step in steps for draw in step.all_draws}
 
-    def renew(self) -> None:
+    def invalidate(self) -> None:
         """Let the next frame make everything, what is kept included: nothing has, or what did failed."""
         self.due = set(self.kept)
         self.reuse.forget()
         self.assemble()
 
-    def arrange(self, *, moved: bool, cull: bool) -> None:
+    def cull_and_sort(self, *, moved: bool, cull: bool) -> None:
         """Let geometry steps draw what their views see now; `moved` says that objects have."""
         for each in self.scene_views:
             if moved or each.table in self.views.changed:
-                each.arrange(self.scene.packed, self.views, cull=cull)
+                each.cull_and_sort(self.scene.packed, self.views, cull=cull)
 
-    def done(self) -> None:
+    def end_frame(self) -> None:
         """A frame has run: go on without the kept steps that were due."""
-        self._begun, self.lists = False, self._steady
+        self._running, self.lists = False, self._steady
         if self.due:
             self.due, self.made_kept = set(), True
 
-    def have(self, resources: Collection[str]) -> None:
+    def mark_restored(self, resources: Collection[str]) -> None:
         """These kept values have been put where they belong: the steps that make nothing else have not to run."""
         missing = {key for key in self.due if any(w.resource not in resources for w in self.kept[key].writes)}
         self.due = self._with_dependents(missing)
         self.reuse.forget()  # what reads them has to run again
         self.assemble()
 
-    def forget_updates(self) -> None:
+    def reset_updates(self) -> None:
         """A drawing begins: what `update` set in the one before does not hold."""
         for region in self.memory.regions.values():
             region.set()
-        self.filled_before = set(self.filled)
+        self.stale = set(self.contents)
 
     def write_buffer(self, id: str, data: bytes) -> None:
         """Write a buffer for `update`; after what this drawing has written all is 0."""
-        buffer, before = self.memory.buffer(id), self.filled.get(id, b"")
-        if id in self.filled_before:
-            self.filled_before.discard(id)
+        buffer, before = self.memory.buffer(id), self.contents.get(id, b"")
+        if id in self.stale:
+            self.stale.discard(id)
             data = now = data.ljust(len(before), b"\0")
         else:
             now = data + before[len(data) :]
         buffer.write(data)
         if now != before:
-            self.filled[id] = now
+            self.contents[id] = now
             self.touched.add(("buffer", id))
 
     def computed(self, steps: Collection[StepKey]) -> None:
@@ -229,9 +229,9 @@ class Executable(Struct, eq=False, dict=True):
             self.due = self._with_dependents(self.due | kept)
             self.assemble()
 
-    def updated(self) -> None:
+    def end_updates(self) -> None:
         """All nodes have been updated: note the regions and buffers that are others than in the frame before."""
-        for id in list(self.filled_before):
+        for id in list(self.stale):
             self.write_buffer(id, b"")
         for (node, number), region in self.memory.regions.items():
             drawn = region.scissor, region.depth_bounds
@@ -239,22 +239,22 @@ class Executable(Struct, eq=False, dict=True):
                 region.drawn = drawn
                 self.touched.add(("region", node, number))
 
-    def take_over(self) -> None:
+    def mark_stale(self) -> None:
         """Another executable has drawn meanwhile: shared programs hold its uniforms, shared textures its texels."""
         self.fresh = True
         self.reuse.forget()
 
-    def break_off(self) -> None:
+    def abort(self) -> None:
         """A step was broken off in its middle: leave nothing of it to what is drawn after."""
         for query in self.occlusion_queries:
             query.abort()
         self.fresh = True
 
-    def next(self, parity: int, *, reuse: bool) -> list[FrameStep]:
+    def steps_for_frame(self, parity: int, *, reuse: bool) -> list[FrameStep]:
         """What a frame runs: all steps, or with `reuse` those whose values are gone or out of date."""
-        if not reuse or self.due or self._begun:  # or the last frame was broken off
+        if not reuse or self.due or self._running:  # or the last frame was broken off
             self.reuse.forget()
-        self._begun = True
+        self._running = True
         changes = self.scene.changes
         if changes != self._seen:
             self.touched |= {name for name, count in changes.items() if self._seen.get(name, 0) != count}
@@ -270,7 +270,7 @@ class Executable(Struct, eq=False, dict=True):
             self._parts[key] = self._listed(parity, positions)
         return self._parts[key]
 
-    def _looks(self) -> list[frozenset[Source]]:
+    def _step_sources(self) -> list[frozenset[Source]]:
         """For each step, what it looks at beside what other steps have made."""
         resources, found = self.plan.resources, []
         for compiled in self.steps[0]:
@@ -402,14 +402,9 @@ class Executable(Struct, eq=False, dict=True):
     def release(self) -> None:
         """Free what it owns; programs and scenes are the session's."""
         self.vertex_arrays()
-        self.memory.release()
-        self.views.release()
-        for buffer in self.buffers:
-            buffer.release()
-        for timer in self.timers:
-            timer.release()
-        for query in self.occlusion_queries:
-            query.release()
+        owned: list[Any] = [self.memory, self.views, *self.buffers, *self.timers, *self.occlusion_queries]
+        for each in owned:
+            each.release()
         self.timers.clear()
         self.occlusion_queries.clear()
 

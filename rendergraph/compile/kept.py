@@ -62,7 +62,7 @@ class KeptValues(Struct, eq=False):
             held = self._held[content] = self._held.pop(content)
             self._copy(held, _of(executable, id))
         if there:
-            executable.have(there)
+            executable.mark_restored(there)
 
     def release(self) -> None:
         for held in self._held.values():

@@ -47,11 +47,11 @@ class Reuse(Struct, eq=False, dict=True):
     """What of a plan has to run, frame after frame.
 
     Attributes:
-        look: tells for each step in order the sources that it looks at itself; asked when a second frame is drawn.
+        step_sources: the sources of each step besides other steps; called when a second frame is drawn.
     """
 
     plan: ResourcePlan
-    look: Callable[[], Sequence[frozenset[Source]]]
+    step_sources: Callable[[], Sequence[frozenset[Source]]]
     _state: _State | None = None
     _complete: bool = False
     _known: dict[tuple[_State, frozenset[Source]], tuple[tuple[int, ...], _State]] = field(default_factory=dict)
@@ -119,16 +119,14 @@ class Reuse(Struct, eq=False, dict=True):
         """The steps whose values are no longer what they would make."""
         stale: set[int] = set()
         for position, touched in enumerate(self._touched):
-            again = position in self._always or not changed.isdisjoint(self._looks[position])
+            again = position in self._always or not changed.isdisjoint(self._sources[position])
             if again or any(self._makers[value] in stale for _, value in touched.needs):
                 stale.add(position)
         return stale
 
-    # What holds for the plan ------------------------------------------------------------------------------------------
-
     @cached_property
-    def _looks(self) -> Sequence[frozenset[Source]]:
-        return self.look()
+    def _sources(self) -> Sequence[frozenset[Source]]:
+        return self.step_sources()
 
     @cached_property
     def _versions(self) -> Versions:

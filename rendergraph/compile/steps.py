@@ -102,7 +102,7 @@ class _Compiler(Struct, eq=False, dict=True):
         self._queries = {
             step.key: OcclusionQuery(self.device) for step in self.plan.schedule.steps if step.key in asked
         }
-        self.looks_back = False
+        self.uses_previous = False
         self._uploads: dict[tuple[str, int], UploadedValues] = {}
         # Where a texture takes a block over: the driver, which knows of no sharing, has to be done with the others.
         self._takeovers = {
@@ -121,10 +121,10 @@ class _Compiler(Struct, eq=False, dict=True):
         made.buffers = list(self.geometry.buffers)
         made.uploads = self._uploads
         made.vertex_arrays = partial(self.programs.forget, id(self.memory))
-        made.looks_back = self.looks_back or self.views.looks_back
+        made.uses_previous = self.uses_previous or self.views.uses_previous
         made.timers = [Timer(self.device) for _ in self.plan.schedule.steps]
         made.occlusion_queries = list(self._queries.values())
-        made.renew()
+        made.invalidate()
         activity.note("preparing a frame")()
         return made
 
@@ -241,7 +241,7 @@ class _Compiler(Struct, eq=False, dict=True):
             for slot, (texture, sampler) in multi_draw.textures.items():
                 uniforms[slot] = self.units.unit((texture,), sampler, binds)
             vertex_array = self.scene.vertex_array(self.programs, program, step.topology)
-            self.looks_back |= any(name in program.object for name in PREVIOUS_ATTRIBUTES)
+            self.uses_previous |= any(name in program.object for name in PREVIOUS_ATTRIBUTES)
             state = self._state(step, depth_default=True, cull=multi_draw.cull, clockwise=multi_draw.clockwise)
             return Draw(program, uniforms, state, multi_draw.call(vertex_array), binds, vertex_array)
 
@@ -305,7 +305,7 @@ class _Compiler(Struct, eq=False, dict=True):
         texts = self._texts(step, macros)
         program = self.programs.get(texts(), blocks, outputs)
         for name in before_views.keys() & program.block_names:
-            self.views.look_back(before_views[name])
+            self.views.keep_previous(before_views[name])
         binds: list[Call] = buffers
         uniforms = step_uniforms(step)
         sampled: set[str] = set()

@@ -62,7 +62,7 @@ class ViewBuffers(Struct, eq=False, dict=True):
         """The first binding point of the steps' own buffers: lights and materials may be storage blocks too."""
         return len(FIXED_BLOCKS) + (2 * len(self.tables) + 1 if self.device.stores_blocks else 0)
 
-    def look_back(self, table: str) -> None:
+    def keep_previous(self, table: str) -> None:
         """Keep from now on what a table's views were in the frame before: a program looks at them."""
         if table not in self._buffers or table in self._before:
             return
@@ -72,7 +72,7 @@ class ViewBuffers(Struct, eq=False, dict=True):
         self._before[table] = self.device.ctx.buffer(reserve=max(1, self.tables[table].count) * VIEW.itemsize)
 
     @property
-    def looks_back(self) -> bool:
+    def uses_previous(self) -> bool:
         """Whether any program looks at views of the frame before."""
         return bool(self._before)
 

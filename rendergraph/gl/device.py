@@ -128,16 +128,12 @@ class Device(Struct, eq=False, dict=True):
         }
 
     def release(self) -> None:
-        if self.mips is not None:
-            with self.current():
-                self.mips.release()
-            self.mips = None
-        if self._idle is not None:
+        made: list[Any] = [self.mips, *(self._idle.color_attachments if self._idle is not None else ()), self._idle]
+        if any(made):
             with self.current():  # otherwise names of another current context would be freed
-                for attachment in self._idle.color_attachments:
-                    attachment.release()
-                self._idle.release()
-            self._idle = None
+                for each in filter(None, made):
+                    each.release()
+            self.mips = self._idle = None
         if self.owned:
             self.ctx.release()
 

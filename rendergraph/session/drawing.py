@@ -49,7 +49,7 @@ class Drawing(Struct, eq=False, dict=True):
         options = self.expanded.options
         self.runner = Runner(self.executable, self.expanded.linked.graph, options.reuses, options.cull)
         history = any(r.role == "history" for r in self.executable.plan.resources.values())
-        self._remembers = history or self.executable.looks_back
+        self._remembers = history or self.executable.uses_previous
 
     def begin(self, lead: int | None = None) -> None:
         """Warm up if the options say so, and clear the history."""

@@ -158,7 +158,7 @@ def compile(expanded: Expanded, gpu: Gpu) -> Drawing:
         planned = expanded if isinstance(expanded, Planned) else plan(expanded)
         executable = gpu.cache.compile(key, planned, scene)
     if executable is not gpu.cache.active:
-        executable.take_over()
+        executable.mark_stale()
     drawing = Drawing(expanded, executable, scene, gpu)
     gpu.cache.active, gpu.cache.drawing = executable, drawing
     return drawing

@@ -58,7 +58,7 @@ def test_a_frame_that_was_broken_off_leaves_nothing(gl: rg.Session, monkeypatch:
     executable = gl.cache.active
     assert executable is not None
     with monkeypatch.context() as patch:
-        patch.setattr(executable, "done", stop)  # as if Ctrl-C came while the steps were run
+        patch.setattr(executable, "end_frame", stop)  # as if Ctrl-C came while the steps were run
         with pytest.raises(KeyboardInterrupt):
             gl.render(pipeline, warm_up=False)
     again = gl.render(pipeline, warm_up=False)

@@ -119,4 +119,4 @@ def test_who_reads_none_pays_for_none(session: rg.Session) -> None:
     plan = rg.load("deferred", size=SIZE).plan()
     assert "gbuffer.velocity" not in plan.resources
     with session.current():
-        assert not session.compile(rg.load("deferred", size=SIZE)).executable.looks_back
+        assert not session.compile(rg.load("deferred", size=SIZE)).executable.uses_previous
