@@ -18,11 +18,12 @@ from rendergraph.cli.app import VERBS
 from rendergraph.resources import folder
 
 SMALL = ("--size", "64x36")
+QUICK = (*SMALL, "-s", "sun.resolution=128")
 SMALLEST = {  # what is added to the examples of a verb: of options that are given twice the last one counts
-    "run": (*SMALL, "-s", "sun.resolution=128"),
-    "bench": (*SMALL, "-n", "2"),
-    "compare": (*SMALL, "-n", "1"),
-    "sweep": (*SMALL, "-n", "1"),
+    "run": (*QUICK, "--executor", "serial"),  # compare/test_executors.py has the other executors
+    "bench": (*QUICK, "-n", "2"),
+    "compare": (*QUICK, "-n", "1"),
+    "sweep": (*QUICK, "-n", "1", "--executor", "serial"),
 }
 
 
