@@ -8,14 +8,15 @@ from collections.abc import Iterator
 
 import click
 
-from rendergraph.cli.app import EXIT_CODES, VERBS, verb
+from rendergraph.cli import commands
+from rendergraph.errors import EXIT_CODES
 
 from .markdown import block, page, prose, table
 
 
 def pages() -> Iterator[tuple[str, str]]:
     """One page."""
-    verbs = {name: verb(name) for name in VERBS}
+    verbs = commands()
     rows = [(f"[`{name}`](#{name})", prose(command.get_short_help_str(200))) for name, command in verbs.items()]
     yield (
         "cli.md",

@@ -28,7 +28,7 @@ import yaml
 from msgspec import Struct
 
 from rendergraph import images
-from rendergraph.cli.app import main as rendergraph
+from rendergraph.cli import main as rendergraph
 from rendergraph.document import Source, from_plain, load
 from rendergraph.resolve import merge_patch
 from rendergraph.resources import folder

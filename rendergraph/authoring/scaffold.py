@@ -69,9 +69,7 @@ class NewNode:
 def new_project(where: Path) -> NewNode:
     """Write a project into a folder, which need not exist: a pipeline, a scene, a node and settings that find it.
 
-    Raises:
-        InputError: a file of it exists already; nothing has been written then.
-        RenderError: writing failed; nothing is left behind.
+    If a file of it exists already, or writing fails, nothing is left behind.
     """
     node = _files(_PROJECT_NODE, "fullscreen", nodes="nodes", file="pipeline")
     words = {"name": _PROJECT_NODE, "id": _PROJECT_NODE, "type": _PROJECT_NODE, "nodes": "nodes"}
@@ -92,11 +90,8 @@ def new_project(where: Path) -> NewNode:
 def new_node(name: str, kind: Kind = "fullscreen", *, package: bool = False, where: Path = Path()) -> NewNode:
     """Write a working node into a folder; with `package`, as a folder that can be installed.
 
-    In the folder of a project its module and shader go into the project's folder of nodes, where they are found.
-
-    Raises:
-        InputError: the name cannot be used, or a file of it exists already; nothing has been written then.
-        RenderError: writing failed; nothing is left behind.
+    In the folder of a project its module and shader go into the project's folder of nodes, where they are found. If a
+    file of it exists already, or writing fails, nothing is left behind.
     """
     mistake = _name_mistake(name, set(Catalog.discover().names()))
     if mistake:
@@ -176,15 +171,7 @@ def _is_installed(name: str) -> bool:
 
 
 def _files(name: str, kind: Kind, *, package: bool = False, nodes: str = "", file: str = "") -> dict[str, str]:
-    """Return the files of a node by path.
-
-    Args:
-        name: of the node.
-        kind: of template.
-        package: in a folder that can be installed.
-        nodes: the project's folder of nodes; empty where all files stand beside each other.
-        file: name of the pipeline, without its ending; the node's by default.
-    """
+    """Return the files of a node by path; `nodes` is the project's folder of nodes, `file` the pipeline's name."""
     by_path = kind == "shader-only" and not package and not nodes
     words = {
         "name": name,

@@ -7,9 +7,13 @@ import gc
 import os
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from rendergraph import activity
 from rendergraph.cli.supervisor import supervise
+
+if TYPE_CHECKING:
+    import click
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -27,9 +31,13 @@ def main(args: Sequence[str] | None = None) -> int:
         activity.note("")()  # what ends the process from now on is no crash
 
 
+def commands() -> dict[str, click.Command]:
+    """Return the verbs by name, in the order of `--help`: what the documentation of the command line is made from."""
+    from rendergraph.cli.app import VERBS, verb  # see above
+
+    return {name: verb(name) for name in VERBS}
+
+
 def _leave() -> None:
     if "OpenImageIO" not in sys.modules:  # whose bindings tell of every object that is still there
         gc.freeze()
-
-
-__all__ = ["main"]

@@ -17,7 +17,16 @@ from typing import NoReturn
 from rendergraph import activity
 from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import only_data, print_error, say, set_quiet
-from rendergraph.errors import InputError, Interruption, Place, Problem, RendergraphError, is_framework, suggestion
+from rendergraph.errors import (
+    EXIT_CODES,
+    InputError,
+    Interruption,
+    Place,
+    Problem,
+    RendergraphError,
+    is_framework,
+    suggestion,
+)
 from rendergraph.version import __version__
 
 _MODULES = {
@@ -67,16 +76,6 @@ _SYNONYMS = {
 """What other programs call our verbs."""
 
 INTERRUPTED = 130
-EXIT_CODES = {
-    0: "success",
-    1: "failed while running: disk, memory, GL",
-    2: "wrong command line: unknown verb or option, malformed value",
-    3: "an error in a file, or something missing: pipeline, scene, mesh, image, shader",
-    4: "a comparison exceeded its threshold",
-    5: "no usable GL device",
-    INTERRUPTED: "interrupted",
-    143: "terminated",
-}
 
 
 def verb(name: str) -> click.Command:

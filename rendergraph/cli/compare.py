@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -272,32 +273,29 @@ def exceeded(results: Sequence[Result], thresholds: Sequence[Threshold]) -> list
 
 def summary(results: Sequence[Result]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
     """Return the headings and a row for each variant: errors, times, passes, bytes; for pictures only errors."""
-    more = list(dict.fromkeys(name for result in results for name in result.columns))
-    heads: tuple[str, ...] = ("", "FLIP", "RMSE", "PSNR", "SSIM", *more)
-    rows: list[tuple[object, ...]] = []
-    for result in results:
-        m = result.metrics
-        psnr = "∞" if m.psnr is None else f"{m.psnr:.2f}"
-        errors = (f"{m.flip:.4f}", f"{m.rmse:.4f}", psnr, f"{m.ssim:.4f}")
-        figures = ("–" if (own := result.columns.get(name)) is None else f"{own:.4g}" for name in more)
-        rows.append((result.name, *errors, *figures))
-    if not all(result.memory for result in results):
-        return heads, rows
-    again = ("repeats",) if any(result.times.repeated for result in results) else ()
-    costs = [_costs(result, repeated=bool(again)) for result in results]
-    return (*heads, "GPU ms", "10–90 %", *again, "CPU ms", "passes", "textures"), [
-        (*row, *cost) for row, cost in zip(rows, costs, strict=True)
+    columns: list[tuple[str, Callable[[Result], object]]] = [
+        ("", lambda r: r.name),
+        ("FLIP", lambda r: f"{r.metrics.flip:.4f}"),
+        ("RMSE", lambda r: f"{r.metrics.rmse:.4f}"),
+        ("PSNR", lambda r: "∞" if r.metrics.psnr is None else f"{r.metrics.psnr:.2f}"),
+        ("SSIM", lambda r: f"{r.metrics.ssim:.4f}"),
+        *((name, partial(_figure, name)) for name in dict.fromkeys(n for result in results for n in result.columns)),
     ]
+    if all(result.memory for result in results):
+        columns.append(("GPU ms", lambda r: f"{r.times.gpu_ms.median:.2f}" if r.times.gpu_ms else "–"))
+        columns.append(("10–90 %", lambda r: f"{gpu.p10:.2f}–{gpu.p90:.2f}" if (gpu := r.times.gpu_ms) else ""))
+        if any(result.times.repeated for result in results):
+            columns.append(("repeats", lambda r: f"{s.min:.2f}–{s.max:.2f}" if (s := r.times.repeated) else ""))
+        columns.append(("CPU ms", lambda r: f"{r.times.cpu_ms.median:.2f}"))
+        columns.append(("passes", lambda r: r.pass_count))
+        columns.append(("textures", lambda r: format_bytes(r.allocated_bytes)))
+    rows = [tuple(value_of(result) for _, value_of in columns) for result in results]
+    return tuple(name for name, _ in columns), rows
 
 
-def _costs(result: Result, *, repeated: bool) -> tuple[object, ...]:
-    times = result.times
-    among = times.repeated
-    again = (f"{among.min:.2f}–{among.max:.2f}" if among else "",) if repeated else ()
-    gpu = f"{times.gpu_ms.median:.2f}" if times.gpu_ms else "–"
-    spread = f"{times.gpu_ms.p10:.2f}–{times.gpu_ms.p90:.2f}" if times.gpu_ms else ""
-    size = format_bytes(result.allocated_bytes)
-    return gpu, spread, *again, f"{times.cpu_ms.median:.2f}", result.pass_count, size
+def _figure(name: str, result: Result) -> str:
+    value = result.columns.get(name)
+    return "–" if value is None else f"{value:.4g}"
 
 
 def _text(comparison: Comparison) -> str:

@@ -39,15 +39,9 @@ _MOST_NAMES = 3
 
 @dataclass(frozen=True)
 class Turn:
-    """One attempt to render.
+    """One attempt to render: its result or error, the files that caused it, its time, and the files to watch now.
 
-    Attributes:
-        value: the returned value; None if it failed.
-        error: why it failed.
-        changed: the files that caused it; none the first time.
-        ms: milliseconds from noticing the change until everything was rendered and written.
-        made: number of `programs`, `textures` and `scenes` that were created.
-        files: the files that it looked for, which are watched now.
+    `made` is the number of `programs`, `textures` and `scenes` that were created.
     """
 
     value: dict[str, Any] | None

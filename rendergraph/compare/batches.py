@@ -42,13 +42,7 @@ Key: TypeAlias = "tuple[int, str]"
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Variants that are rendered in the same frames.
-
-    Attributes:
-        numbers: of the variants.
-        names: of each variant, its nodes' ids to ids in the merged graph.
-        planned: the merged graph.
-    """
+    """Variants that are rendered in the same frames; `names` are the ids of their nodes in the merged graph."""
 
     numbers: tuple[int, ...]
     names: tuple[Mapping[str, str], ...]

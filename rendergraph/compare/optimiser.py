@@ -128,13 +128,9 @@ def search(
 ) -> Sweep:
     """Search for the settings that minimise one or several objectives.
 
-    The arguments are those of `sweep`; continuous ranges need no samples. `minimise` has the objectives, `budget` the
-    maximum number of runs; with `resume` the search continues, also with a larger budget.
-
-    Raises:
-        InputError: as from `sweep`; or there is no reference, or an unknown objective.
-        UsageError: Optuna is not installed.
-        RenderError, DeviceError: as from `sweep`.
+    Arguments and errors are those of `sweep`; continuous ranges need no samples, and there must be a reference.
+    `minimise` has the objectives, `budget` the maximum number of runs; with `resume` the search continues, also with a
+    larger budget.
     """
     require("--minimise", "search", "optuna")
     options = options.replace(**settings)

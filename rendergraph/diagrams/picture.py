@@ -73,10 +73,7 @@ def svg(graph: Graph) -> str:
 def draw(content: Sheet, marks: Mapping[str, Mark] = {}, highlights: Mapping[Link, str] = {}) -> str:
     """Return a stand-alone SVG document, left to right, for light and dark pages.
 
-    Args:
-        content: what is drawn.
-        marks: nodes to highlight.
-        highlights: links to highlight, with a colour; `-` before it means dashed.
+    Marks highlight nodes, highlights links, with a colour; `-` before it means dashed.
     """
     return _Picture(content, marks, highlights).draw()
 

@@ -17,6 +17,16 @@ from msgspec.structs import replace
 _WIDEST = 200
 """Characters of a file's line that a message shows, those around the place."""
 _LONGEST_OPTION = 80
+EXIT_CODES = {
+    0: "success",
+    1: "failed while running: disk, memory, GL",
+    2: "wrong command line: unknown verb or option, malformed value",
+    3: "an error in a file, or something missing: pipeline, scene, mesh, image, shader",
+    4: "a comparison exceeded its threshold",
+    5: "no usable GL device",
+    130: "interrupted",
+    143: "terminated",
+}
 
 
 class Option(Struct, frozen=True):

@@ -150,9 +150,7 @@ class WorkerProcess:
     def receive(self) -> tuple[str, Any]:
         """Wait for the next message about the task: `(item, value)`, `(finished, seconds)` or `(failed, error)`.
 
-        Raises:
-            RenderError: the process has ended, or made no progress and was terminated.
-            DeviceError: it has no usable GL device.
+        A RenderError says that the process has ended or was terminated, a DeviceError that it has no usable GL device.
         """
         assert self.child is not None
         while True:

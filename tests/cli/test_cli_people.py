@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from rendergraph.cli.app import EXIT_CODES
+from rendergraph.errors import EXIT_CODES
 from rendergraph.resources import folder, shipped_pipelines, shipped_scenes
 
 ROOT = Path(__file__).parents[2]

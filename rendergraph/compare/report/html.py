@@ -6,7 +6,6 @@ import base64
 import math
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
@@ -86,24 +85,14 @@ def card(entries: Iterable[tuple[str, object]]) -> str:
     return f'<dl class="card">{rows}</dl>'
 
 
-@dataclass(frozen=True)
-class Section:
-    identity: str
-    title: str
-    body: str
-
-    @property
-    def link(self) -> str:
-        return f'<a href="#{self.identity}">{escape(self.title)}</a>'
-
-    @property
-    def html(self) -> str:
-        head = f'<h2 id="{self.identity}-title">{escape(self.title)}</h2>'
-        return f'<section id="{self.identity}" aria-labelledby="{self.identity}-title">{head}\n{self.body}\n</section>'
-
-
-def section(identity: str, title: str, *parts: str) -> Section:
-    return Section(identity, title, "\n".join(part for part in parts if part))
+def section(identity: str, title: str, *parts: str) -> tuple[str, str]:
+    """Return a link to a section, and the section; both are empty without content."""
+    body = "\n".join(filter(None, parts))
+    if not body:
+        return "", ""
+    head = f'<h2 id="{identity}-title">{escape(title)}</h2>'
+    html = f'<section id="{identity}" aria-labelledby="{identity}-title">{head}\n{body}\n</section>'
+    return f'<a href="#{identity}">{escape(title)}</a>', html
 
 
 def notebook_html(

@@ -8,7 +8,6 @@ from html import escape
 
 from rendergraph.compare.engine import Sweep
 from rendergraph.compare.report.html import (
-    Section,
     card,
     drawing,
     milliseconds,
@@ -105,24 +104,17 @@ def _times(comparison: Comparison, results: Sequence[Result], front: Sequence[Re
     return f'<div class="beside"><div>{_passes(results)}</div>{chart}</div>', software_note(comparison.software)
 
 
-def _page(title: str, note: str, comparison: Comparison, sections: Sequence[Section], command: str) -> str:
+def _page(title: str, note: str, comparison: Comparison, sections: Sequence[tuple[str, str]], command: str) -> str:
     home = folder("rendergraph") / "compare" / "report"
     style, script = ((home / f"page.{kind}").read_text(encoding="utf-8") for kind in ("css", "js"))
     width, height = comparison.size
     device = comparison.device
     facts = [comparison.scene, f"{width}×{height}", str(device.get("renderer", ""))]
     facts[1:1] = [f"camera {comparison.camera}"] if comparison.camera else []
-    closing = [
-        section(
-            "again",
-            "Command",
-            f"<pre><code>{escape(command)}</code></pre>",
-            "".join(f"<p class=quiet>{escape(note)}.</p>" for note in comparison.notes),
-            _folded("The machine", _machine(comparison)),
-        ),
-    ]
-    filled = [part for part in [*sections, *closing] if part.body]
-    links = "".join(part.link for part in filled)
+    notes = "".join(f"<p class=quiet>{escape(note)}.</p>" for note in comparison.notes)
+    repeat = f"<pre><code>{escape(command)}</code></pre>"
+    closing = section("again", "Command", repeat, notes, _folded("The machine", _machine(comparison)))
+    links, bodies = (list(filter(None, column)) for column in zip(*sections, closing, strict=True))
     # Nothing may be fetched: the page says so to the browser, which then holds it to that.
     policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
     return (
@@ -134,8 +126,8 @@ def _page(title: str, note: str, comparison: Comparison, sections: Sequence[Sect
         f"<h1>{escape(title)}</h1>\n"
         f'<p class="lead">{escape(" · ".join(fact for fact in facts if fact))}</p>\n'
         + "".join(f'<p class="note">{escape(part.strip())}</p>\n' for part in note.split("\n\n") if part.strip())
-        + f'<nav aria-label="Sections">{links}</nav>\n</header>\n'
-        + "\n".join(part.html for part in filled)
+        + f'<nav aria-label="Sections">{"".join(links)}</nav>\n</header>\n'
+        + "\n".join(bodies)
         + f"\n</main>\n<script>\n{script}</script>\n</body>\n</html>\n"
     )
 
