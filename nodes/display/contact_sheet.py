@@ -10,71 +10,74 @@ from rendergraph.api import DisplayColor, Input, Node, Output, SceneError, Steps
 
 from ._text import characters
 
-_MOST = 12
-_LETTERS = 20  # of a label
-_ENCODED, _PLAIN, _GREY = range(3)
+_MAX_PICTURES = 12
+_LABEL_LENGTH = 20
+_DISPLAY_COLOR, _VALUES, _GREY = range(3)  # kinds of pictures, as in the shader
 
 
 class ContactSheet(Node):
-    """A grid of pictures with labels, row by row from the upper left, each as large as its share of the sheet takes it.
+    """Arrange pictures in a grid with labels, row by row from the upper left, each as large as its cell allows.
 
-    What is larger than its place shrinks to the mean of the light that its texels send, what is smaller shows its
-    texels as squares. Textures that hold no display colour are shown as they are, from 0 to 1, those of one channel in
-    grey.
+    Larger pictures are reduced by averaging texels in linear light; the texels of smaller ones are shown as squares.
+    Textures that are no display colour are shown unchanged, from 0 to 1, those of one channel in grey.
     """
 
-    pictures = Input(AnyTexel, many=True, size="any", doc="What is shown, up to 12, in this order.")
-    color = Output(DisplayColor, format="rgba8", doc="The sheet, as large as the picture of the pipeline.")
+    pictures = Input(AnyTexel, many=True, size="any", doc="Up to 12 pictures, in this order.")
+    color = Output(DisplayColor, format="rgba8", doc="The sheet, of the size of the pipeline's picture.")
 
-    columns: int = structural(default=0, min=0, max=_MOST, doc="Pictures in a row; 0: about as many rows as columns.")
-    labels: tuple[str, ...] = structural(default=(), doc="A text for each, capitals and digits; none by default.")
-    gap: int = structural(default=4, unit="texels", min=0, max=256, doc="Between pictures.")
-    background: float = param(default=0.02, min=0, max=1, doc="Grey between them, display-linear.")
+    columns: int = structural(
+        default=0, min=0, max=_MAX_PICTURES, doc="Pictures per row; 0: about as many rows as columns."
+    )
+    labels: tuple[str, ...] = structural(
+        default=(), doc="A text for each picture, of capital letters and digits; none by default."
+    )
+    gap: int = structural(default=4, unit="texels", min=0, max=256, doc="Space between pictures.")
+    background: float = param(default=0.02, min=0, max=1, doc="Grey between pictures, display-linear.")
 
     def record(self, steps: Steps) -> None:
-        """One step that finds the picture of each texel."""
-        shown = steps.facts.inputs["pictures"]
-        if len(shown) > _MOST:
-            raise SceneError(f"it is given {len(shown)} pictures; a sheet has up to {_MOST}")
-        if len(self.labels) > len(shown):
-            raise SceneError(f"it has {len(self.labels)} labels for {len(shown)} pictures")
-        texts = [*self.labels, *[""] * (len(shown) - len(self.labels))]
-        sizes = [one.desc.mip_size(0) for one in shown if one.desc is not None]
+        """Record one step that draws all pictures."""
+        inputs = steps.facts.inputs["pictures"]
+        if len(inputs) > _MAX_PICTURES:
+            raise SceneError(f"it is given {len(inputs)} pictures; a sheet has up to {_MAX_PICTURES}")
+        if len(self.labels) > len(inputs):
+            raise SceneError(f"it has {len(self.labels)} labels for {len(inputs)} pictures")
+        texts = [*self.labels, *[""] * (len(inputs) - len(self.labels))]
+        sizes = [one.desc.mip_size(0) for one in inputs if one.desc is not None]
         sheet = steps.desc(self.color).mip_size(0)
-        places = _places(sizes, sheet, self.columns or math.ceil(math.sqrt(len(shown))), self.gap)
+        rectangles = _rectangles(sizes, sheet, self.columns or math.ceil(math.sqrt(len(inputs))), self.gap)
         steps.fullscreen(
             "contact_sheet.frag",
-            defines={"LETTERS": _LETTERS, "SHEET_HEIGHT": sheet[1]},
+            defines={"LABEL_LENGTH": _LABEL_LENGTH, "SHEET_HEIGHT": sheet[1]},
             pictures=self.pictures,
-            kinds=[_kind(one) for one in shown],
+            kinds=[_kind(one) for one in inputs],
             sizes=list(chain.from_iterable(sizes)),
-            places=list(chain.from_iterable(places)),
-            letters=[number for text in texts for number in characters(text, _LETTERS)],
+            rectangles=list(chain.from_iterable(rectangles)),
+            characters=[number for text in texts for number in characters(text, _LABEL_LENGTH)],
         )
 
 
-def _places(
+def _rectangles(
     sizes: list[tuple[int, int]], sheet: tuple[int, int], columns: int, gap: int
 ) -> list[tuple[int, int, int, int]]:
-    """Where pictures are shown: x and y of the upper left, width and height; the grid is in the sheet's middle."""
+    """Return x and y of the upper left corner, width and height of each picture, in a centred grid."""
     columns = min(columns, len(sizes))
     grid = columns, math.ceil(len(sizes) / columns)
-    room = [max(1, (whole - gap * (count + 1)) // count) for whole, count in zip(sheet, grid, strict=True)]
-    scales = [min(room[0] / width, room[1] / height) for width, height in sizes]
-    shown = [[max(1, int(side * scale + 1e-6)) for side in size] for size, scale in zip(sizes, scales, strict=True)]
-    cell = [max(size[axis] for size in shown) for axis in (0, 1)]
+    available = [max(1, (extent - gap * (count + 1)) // count) for extent, count in zip(sheet, grid, strict=True)]
+    scales = [min(available[0] / width, available[1] / height) for width, height in sizes]
+    scaled = [[max(1, int(side * scale + 1e-6)) for side in size] for size, scale in zip(sizes, scales, strict=True)]
+    cell = [max(size[axis] for size in scaled) for axis in (0, 1)]
     first = [(sheet[axis] - grid[axis] * (cell[axis] + gap) + gap) // 2 for axis in (0, 1)]
-    found = []
-    for number, size in enumerate(shown):
-        at = number % columns, number // columns
-        x, y = (first[i] + at[i] * (cell[i] + gap) + (cell[i] - size[i]) // 2 for i in (0, 1))
-        found.append((x, y, size[0], size[1]))
-    return found
+    rectangles = []
+    for number, size in enumerate(scaled):
+        position = number % columns, number // columns
+        x, y = (first[i] + position[i] * (cell[i] + gap) + (cell[i] - size[i]) // 2 for i in (0, 1))
+        rectangles.append((x, y, size[0], size[1]))
+    return rectangles
 
 
 def _kind(picture: TextureInfo) -> int:
-    """How its texels are meant."""
+    """Return how the texels of a picture are shown."""
     if picture.semantic == DisplayColor:
-        return _ENCODED
-    single = picture.desc is not None and picture.desc.format.startswith(("r8", "r16", "r32", "depth"))
-    return _GREY if single else _PLAIN
+        return _DISPLAY_COLOR
+    has_one_channel = picture.desc is not None and picture.desc.format.startswith(("r8", "r16", "r32", "depth"))
+    return _GREY if has_one_channel else _VALUES

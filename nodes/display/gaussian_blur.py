@@ -6,21 +6,19 @@ from rendergraph.api import Any, Input, Internal, Node, Output, Steps, param
 
 
 class GaussianBlur(Node):
-    """The same picture under a Gaussian, one axis after the other.
+    """Blur a picture by a Gaussian, one axis after the other.
 
-    `2 radius + 1` taps an axis, sampled at texel centres and normalised to sum to one, so a flat picture stays as it
-    is; beyond the border the border's texels go on.
+    Each axis has `2 radius + 1` taps at texel centres, whose weights add up to 1, so that a uniform picture is
+    unchanged. Beyond the border, the texels at the border are repeated.
     """
 
-    source = Input(Any, size="any", doc="What to blur.")
-    blurred = Output(like="source", size="source", doc="The same, blurred.")
-    across = Internal(like="source", size="source")
+    source = Input(Any, size="any", doc="The picture to blur.")
+    blurred = Output(like="source", size="source", doc="The blurred picture.")
+    blurred_x = Internal(like="source", size="source")
 
-    radius: int = param(
-        default=6, unit="texels", min=0, max=128, doc="Three standard deviations; 0 leaves all as it is."
-    )
+    radius: int = param(default=6, unit="texels", min=0, max=128, doc="Three standard deviations; 0: no blur.")
 
     def record(self, steps: Steps) -> None:
-        """Across, then up."""
-        steps.fullscreen("gaussian_blur.frag", source=self.source, out=self.across, axis=(1, 0))
-        steps.fullscreen("gaussian_blur.frag", source=self.across, out=self.blurred, axis=(0, 1))
+        """Record the horizontal and the vertical blur."""
+        steps.fullscreen("gaussian_blur.frag", source=self.source, out=self.blurred_x, axis=(1, 0))
+        steps.fullscreen("gaussian_blur.frag", source=self.blurred_x, out=self.blurred, axis=(0, 1))

@@ -1,4 +1,4 @@
-"""Any texture in a corner of the picture."""
+"""A texture in a corner of the picture."""
 
 from __future__ import annotations
 
@@ -8,32 +8,40 @@ from typing import Any, Literal
 from rendergraph.api import Any as AnyTexel
 from rendergraph.api import DisplayColor, InOut, Input, Node, Steps, TextureInfo, param, structural
 
-_AS_LIGHT = frozenset({"radiance", "albedo", "emissive", "luminance"})
-_CHANNELS = {"rgba": 4, "rgb": 4, "r11": 4, "rg": 2, "r": 1, "depth": 1}  # the first that a format's name begins with
+_LIGHT_SEMANTICS = frozenset({"radiance", "albedo", "emissive", "luminance"})
+_CHANNELS = {"rgba": 4, "rgb": 4, "r11": 4, "rg": 2, "r": 1, "depth": 1}  # the first prefix of a format's name counts
 
 
 class ShowTexture(Node):
-    """A texture in a corner of a finished picture: a shadow map, a G-buffer's normals, an occlusion, whatever there is.
+    """Show a texture in a corner of a finished picture: a shadow map, normals, occlusion, anything.
 
-    Depth, of a shadow map too, is the distance from its own view, black at that view's near plane and white at its far
-    one and where nothing is. Light has the display's curve, normals go from -1 and 1 to 0 and 1, everything else is as
-    it is; one channel is grey. `low` and `high` spread a part of that over black to white. Layers lie in a grid, row by
-    row.
+    Depth is shown as the distance from its own view, black at the near plane, white at the far plane and for
+    background. Light is sRGB encoded, normals are mapped from -1 and 1 to 0 and 1, and all other values are unchanged;
+    single channels are grey. `low` and `high` select the range from black to white. Layers are arranged in a grid, row
+    by row.
     """
 
     source = Input(AnyTexel, size="any", optional=True, doc="The texture.")
-    layers = Input(AnyTexel, kind="texture2d_array", size="any", optional=True, doc="Or one with layers; all show.")
+    layers = Input(
+        AnyTexel,
+        kind="texture2d_array",
+        size="any",
+        optional=True,
+        doc="Alternatively, a texture with layers, which are all shown.",
+    )
     color = InOut(DisplayColor, doc="The picture.")
 
     corner: Literal["lower_left", "lower_right", "upper_left", "upper_right"] = structural(
-        default="lower_right", doc="Where it stands."
+        default="lower_right", doc="The corner."
     )
-    height: float = structural(default=0.4, min=0.01, max=1, doc="Of all layers together, as a share of the picture's.")
-    low: float = param(default=0.0, doc="What becomes black.")
-    high: float = param(default=1.0, doc="What becomes white.")
+    height: float = structural(
+        default=0.4, min=0.01, max=1, doc="Height of all layers together, relative to the picture."
+    )
+    low: float = param(default=0.0, doc="Value shown as black.")
+    high: float = param(default=1.0, doc="Value shown as white.")
 
     def record(self, steps: Steps) -> None:
-        """One step, which leaves the rest of the picture as it is."""
+        """Record one step; the rest of the picture is unchanged."""
         port = self.layers if steps.connected(self.layers) else self.source
         if not steps.connected(port):
             return
@@ -45,30 +53,30 @@ class ShowTexture(Node):
         tile = max(1, round(tile_height * desc.width / desc.height)), tile_height
         left = margin if self.corner.endswith("left") else picture.width - margin - columns * tile[0]
         bottom = margin if self.corner.startswith("lower") else picture.height - margin - rows * tile[1]
-        shown: dict[str, Any] = {port.name: port}
+        reads: dict[str, Any] = {port.name: port}
         steps.fullscreen(
             "show_texture.frag",
             out=self.color,
-            defines={"LAYERS": desc.layers, "COLUMNS": columns, **_meaning(steps.facts.input(port.name))},
-            place=(left, bottom),
-            tile=tile,
-            **shown,
+            defines={"LAYERS": desc.layers, "COLUMNS": columns, **_texel_macros(steps.facts.input(port.name))},
+            origin=(left, bottom),
+            tile_size=tile,
+            **reads,
         )
 
 
-def _meaning(info: TextureInfo) -> dict[str, int | str]:
-    """What the shader is told of what the texels mean."""
+def _texel_macros(info: TextureInfo) -> dict[str, int | str]:
+    """Return the macros that describe the texels."""
     assert info.desc is not None
-    form, word = info.desc.format, info.semantic.name
-    whole = "u" if form.endswith("ui") else "i" if form.endswith("i") else ""
-    found: dict[str, int | str] = {
-        "CHANNELS": next(count for start, count in _CHANNELS.items() if form.startswith(start)),
-        "SAMPLER": f"{whole}sampler2DArray" if info.desc.kind == "texture2d_array" else f"{whole}sampler2D",
+    format_name, semantic = info.desc.format, info.semantic.name
+    prefix = "u" if format_name.endswith("ui") else "i" if format_name.endswith("i") else ""
+    macros: dict[str, int | str] = {
+        "CHANNELS": next(count for start, count in _CHANNELS.items() if format_name.startswith(start)),
+        "SAMPLER": f"{prefix}sampler2DArray" if info.desc.kind == "texture2d_array" else f"{prefix}sampler2D",
     }
-    if word in ("depth", "shadow_map") and info.view is not None:
-        found["MEANS_DEPTH"] = 1
-    elif word in _AS_LIGHT or info.semantic.encoding == "linear":
-        found["MEANS_LIGHT"] = 1
-    elif word == "normal":
-        found["MEANS_NORMAL"] = 1
-    return found
+    if semantic in ("depth", "shadow_map") and info.view is not None:
+        macros["MEANS_DEPTH"] = 1
+    elif semantic in _LIGHT_SEMANTICS or info.semantic.encoding == "linear":
+        macros["MEANS_LIGHT"] = 1
+    elif semantic == "normal":
+        macros["MEANS_NORMAL"] = 1
+    return macros

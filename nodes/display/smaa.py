@@ -1,37 +1,39 @@
-"""Morphological antialiasing with areas from a table."""
+"""Subpixel morphological antialiasing."""
 
 from __future__ import annotations
 
 from rendergraph.api import Any, DisplayColor, Input, Internal, Node, Output, Steps, param
 
-LONGEST = 32
-"""Texels that an edge is followed each way at the most."""
+MAX_REACH = 32
+"""The largest number of texels that an edge is searched to each side."""
 
 
 class SMAA(Node):
-    """Smooth the edges of a finished picture by the shapes they have.
+    """Smooth the edges of a finished picture by their patterns.
 
-    Subpixel morphological antialiasing (Jimenez, Echevarria, Sousa and Gutierrez 2012), its orthogonal part, in three
-    steps: edges where brightness changes; from each pixel at an edge the way to both ends, what crosses there, and how
-    much of the pixel lies beyond the straight line that this makes of the stair; and the mix with the neighbour, in
-    display light. The areas lie in a table over both ways and the nine shapes, computed once from their definition.
+    The orthogonal part of subpixel morphological antialiasing (Jimenez, Echevarria, Sousa and Gutierrez 2012), in three
+    steps: detection of edges in the luma; search for both ends and the crossing edges there, which determine the line
+    that replaces the staircase, and the area of the pixel beyond it; and blending with the neighbour, in linear light.
+    Areas come from a table over both distances and the nine patterns, computed once from their definition.
     """
 
-    source = Input(DisplayColor, doc="The finished picture, as it is seen.")
-    color = Output(like="source", doc="The same with smooth edges; alpha as it was.")
-    areas = Internal(Any, format="rg16", size=(9 * (LONGEST + 1), LONGEST + 1), kept=True)
+    source = Input(DisplayColor, doc="The finished picture, display-referred.")
+    color = Output(like="source", doc="The picture with smooth edges; alpha unchanged.")
+    area_table = Internal(Any, format="rg16", size=(9 * (MAX_REACH + 1), MAX_REACH + 1), kept=True)
     edges = Internal(format="rg8", size="source")
     weights = Internal(format="rgba8", size="source")
 
-    threshold: float = param(default=0.1, min=0, max=1, doc="Difference of brightness that is an edge.")
+    threshold: float = param(default=0.1, min=0, max=1, doc="Least difference of luma at an edge.")
     dominance: float = param(
-        default=2.0, min=1, max=100, doc="An edge beside another that is so many times as strong is none."
+        default=2.0, min=1, max=100, doc="Edges next to one that is stronger by this factor are dropped."
     )
-    reach: int = param(default=16, min=1, max=LONGEST, unit="texels", doc="How far an edge is followed each way.")
+    reach: int = param(default=16, min=1, max=MAX_REACH, unit="texels", doc="How far an edge is searched to each side.")
 
     def record(self, steps: Steps) -> None:
-        """The table, edges, weights, and the mix."""
-        steps.fullscreen("smaa_areas.frag", out=self.areas, side=LONGEST + 1)
+        """Record the table, edge detection, weights and blending."""
+        steps.fullscreen("smaa_area_table.frag", out=self.area_table, side=MAX_REACH + 1)
         steps.fullscreen("smaa_edges.frag", out=self.edges, source=self.source)
-        steps.fullscreen("smaa_weights.frag", out=self.weights, edges=self.edges, areas=self.areas, side=LONGEST + 1)
+        steps.fullscreen(
+            "smaa_weights.frag", out=self.weights, edges=self.edges, area_table=self.area_table, side=MAX_REACH + 1
+        )
         steps.fullscreen("smaa_blend.frag", out=self.color, source=self.source, weights=self.weights)

@@ -7,7 +7,7 @@ from typing import Any
 from rendergraph.api import Any as AnyTexel
 from rendergraph.api import Blend, Depth, Facts, Internal, Output, State, Stencil, StencilFace, Steps, param
 
-from ..display._means import halve_down
+from ..display._mip_means import fill_mips
 from ._image_lighting import ImageLighting, samples_stored
 from .deferred_lighting import DeferredLighting
 
@@ -111,7 +111,7 @@ class DeferredMultisampled(DeferredLighting):
         self.blend_over(steps)
         if steps.used(self.edge_share):
             steps.fullscreen("<downsample.frag>", source=self.edges, out=self.means.mip(0))
-            last = halve_down(steps, self.means)
+            last = fill_mips(steps, self.means)
             steps.fullscreen("<downsample.frag>", source=self.means.mip(last), out=self.edge_share)
 
     def light_marked(self, steps: Steps, reads: dict[str, Any], first: int) -> None:

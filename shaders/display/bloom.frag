@@ -1,4 +1,4 @@
-// The mean of all levels of a glow, brought to full size bilinearly and blended onto the picture.
+// Adds the mean of all mip levels of the glow to the picture, upsampled bilinearly.
 uniform sampler2D glow;
 uniform float intensity;
 in vec2 v_uv;

@@ -2,11 +2,11 @@
 #include <srgb.glsl>
 #include <text.glsl>
 
-const int ENCODED = 0, PLAIN = 1, GREY = 2;  // display colour; values as they are; one channel of them
+const int DISPLAY_COLOR = 0, VALUES = 1, GREY = 2;  // sRGB encoded; values from 0 to 1; the same of one channel
 uniform int kinds[PICTURES_COUNT];
 uniform ivec2 sizes[PICTURES_COUNT];
-uniform ivec4 places[PICTURES_COUNT];  // on the sheet: the upper left, width and height
-uniform int letters[PICTURES_COUNT * LETTERS];
+uniform ivec4 rectangles[PICTURES_COUNT];  // upper left corner on the sheet, width, height
+uniform int characters[PICTURES_COUNT * LABEL_LENGTH];
 uniform float background;  // display-linear
 out vec4 color;
 
@@ -45,7 +45,7 @@ uniform sampler2D pictures_10;
 uniform sampler2D pictures_11;
 #endif
 
-vec4 texel_of(int picture, ivec2 texel) {
+vec4 fetch_picture(int picture, ivec2 texel) {
     switch (picture) {
         case 0: return texelFetch(pictures_0, texel, 0);
 #if PICTURES_COUNT > 1
@@ -85,51 +85,55 @@ vec4 texel_of(int picture, ivec2 texel) {
     return vec4(0.0);
 }
 
-// A picture's value at a place counted from its upper left; what is decoded is light.
-vec3 value_at(int picture, ivec2 place) {
-    vec4 found = texel_of(picture, ivec2(place.x, sizes[picture].y - 1 - place.y));
-    if (kinds[picture] == GREY) found = found.rrrr;
-    found = clamp(found, 0.0, 1.0);
-    return kinds[picture] == ENCODED ? srgb_to_linear(found.rgb) : found.rgb;
+// The value of a texel of a picture, decoded to light; texels count from the upper left.
+vec3 picture_value(int picture, ivec2 texel) {
+    vec4 value = fetch_picture(picture, ivec2(texel.x, sizes[picture].y - 1 - texel.y));
+    if (kinds[picture] == GREY) value = value.rrrr;
+    value = clamp(value, 0.0, 1.0);
+    return kinds[picture] == DISPLAY_COLOR ? srgb_to_linear(value.rgb) : value.rgb;
 }
 
-// The mean over what a texel of the sheet covers of a picture, by area; a single texel of one that is enlarged.
-vec3 mean_at(int picture, ivec2 place, ivec2 shown) {
-    vec2 scale = vec2(sizes[picture]) / vec2(shown);
-    if (all(lessThanEqual(scale, vec2(1.0)))) return value_at(picture, ivec2((vec2(place) + 0.5) * scale));
-    vec2 low = vec2(place) * scale, high = min(low + scale, vec2(sizes[picture]));
+// The area-weighted mean of the texels of a picture that a texel of the sheet covers, or the nearest texel of a picture
+// that is enlarged.
+vec3 resampled_value(int picture, ivec2 texel, ivec2 target_size) {
+    vec2 scale = vec2(sizes[picture]) / vec2(target_size);
+    if (all(lessThanEqual(scale, vec2(1.0)))) return picture_value(picture, ivec2((vec2(texel) + 0.5) * scale));
+    vec2 low = vec2(texel) * scale, high = min(low + scale, vec2(sizes[picture]));
     vec3 sum = vec3(0.0);
     for (int y = int(low.y); float(y) < high.y; ++y) {
         for (int x = int(low.x); float(x) < high.x; ++x) {
-            vec2 at = vec2(x, y), covered = max(min(at + 1.0, high) - max(at, low), 0.0);
-            sum += value_at(picture, ivec2(at)) * covered.x * covered.y;
+            vec2 source = vec2(x, y), overlap = max(min(source + 1.0, high) - max(source, low), 0.0);
+            sum += picture_value(picture, ivec2(source)) * overlap.x * overlap.y;
         }
     }
     return sum / ((high.x - low.x) * (high.y - low.y));
 }
 
-// How much of a label is at a place counted from its upper left: 0 nothing, 1 its ground, 2 a letter.
-int label_at(int picture, ivec2 place, int dots) {
+const int NO_LABEL = 0, LABEL_BACKGROUND = 1, LABEL_TEXT = 2;
+
+// What the label of a picture has at a texel, counted from the upper left; `scale` is in texels per font pixel.
+int label_at(int picture, ivec2 texel, int scale) {
     int count = 0;
-    for (int i = 0; i < LETTERS; ++i) {
-        if (letters[picture * LETTERS + i] != BLANK) count = i + 1;
+    for (int i = 0; i < LABEL_LENGTH; ++i) {
+        if (characters[picture * LABEL_LENGTH + i] != BLANK) count = i + 1;
     }
-    if (count == 0 || place.x >= (4 * count + 3) * dots || place.y >= 9 * dots) return 0;
-    ivec2 dot = place / dots - 2;
-    if (dot.x < 0 || dot.x / 4 >= count) return 1;
-    return glyph_pixel(letters[picture * LETTERS + dot.x / 4], ivec2(dot.x % 4, 4 - dot.y)) ? 2 : 1;
+    if (count == 0 || texel.x >= (4 * count + 3) * scale || texel.y >= 9 * scale) return NO_LABEL;
+    ivec2 pixel = texel / scale - 2;
+    if (pixel.x < 0 || pixel.x / 4 >= count) return LABEL_BACKGROUND;
+    int character = characters[picture * LABEL_LENGTH + pixel.x / 4];
+    return glyph_pixel(character, ivec2(pixel.x % 4, 4 - pixel.y)) ? LABEL_TEXT : LABEL_BACKGROUND;
 }
 
 void main() {
-    ivec2 at = ivec2(gl_FragCoord.xy);
-    at.y = SHEET_HEIGHT - 1 - at.y;
+    ivec2 sheet_texel = ivec2(gl_FragCoord.xy);
+    sheet_texel.y = SHEET_HEIGHT - 1 - sheet_texel.y;
     color = vec4(linear_to_srgb(vec3(background)), 1.0);
     for (int i = 0; i < PICTURES_COUNT; ++i) {
-        ivec2 place = at - places[i].xy, shown = places[i].zw;
-        if (any(lessThan(place, ivec2(0))) || any(greaterThanEqual(place, shown))) continue;
-        vec3 mean = mean_at(i, place, shown);
-        color.rgb = kinds[i] == ENCODED ? linear_to_srgb(mean) : mean;
-        int label = label_at(i, place, max(1, SHEET_HEIGHT / 240));
-        if (label > 0) color.rgb = label == 1 ? color.rgb * 0.25 : vec3(1.0);
+        ivec2 texel = sheet_texel - rectangles[i].xy, size = rectangles[i].zw;
+        if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, size))) continue;
+        vec3 value = resampled_value(i, texel, size);
+        color.rgb = kinds[i] == DISPLAY_COLOR ? linear_to_srgb(value) : value;
+        int label = label_at(i, texel, max(1, SHEET_HEIGHT / 240));
+        if (label != NO_LABEL) color.rgb = label == LABEL_BACKGROUND ? color.rgb * 0.25 : vec3(1.0);
     }
 }

@@ -1,6 +1,6 @@
-// The middle of a larger picture; without TEXEL it is a depth.
+// The centre of a larger picture. Without TEXEL, the picture is a depth texture.
 uniform SAMPLER source;
-uniform ivec2 band;  // texels beside the middle, left and below
+uniform ivec2 band;  // width of the border on the left and at the bottom, in texels
 #ifdef TEXEL
 out TEXEL cropped;
 #endif
@@ -10,8 +10,8 @@ void main() {
 #ifdef TEXEL
     cropped = texelFetch(source, texel, 0);
 #ifdef MEANS_VELOCITY
-    vec2 whole = vec2(textureSize(source, 0));
-    cropped.xy *= whole / (whole - 2.0 * vec2(band));
+    vec2 source_size = vec2(textureSize(source, 0));
+    cropped.xy *= source_size / (source_size - 2.0 * vec2(band));
 #endif
 #else
     gl_FragDepth = texelFetch(source, texel, 0).r;

@@ -1,21 +1,21 @@
-// Logarithms of luminance, averaged to half size: the top of the chain that ends in their mean.
+// Logarithms of luminance, averaged to half size. Further downsampling yields their mean.
 #include <luminance.glsl>
 #include <downsample.glsl>
 
 uniform sampler2D radiance;  // scene-linear, alpha is coverage
 uniform float delta;         // keeps black finite
-out vec2 logarithms;         // weighted logarithm, weight
+out vec2 logarithms;         // x = weighted logarithm, y = weight
 
 vec4 source_texel(ivec2 texel) {
-    vec4 here = texelFetch(radiance, texel, 0);
-    float l = luminance_of(here.rgb);
-    l = l > 0.0 ? min(l, 1e9) : 0.0;  // not a number counts as black: one such pixel must not blind the eye for good
+    vec4 source = texelFetch(radiance, texel, 0);
+    float luminance = luminance_of(source.rgb);
+    luminance = luminance > 0.0 ? min(luminance, 1e9) : 0.0;  // NaN becomes black; adaptation would keep it for ever
 #if METER == METER_COVERED
-    float weight = clamp(here.a, 0.0, 1.0);
+    float weight = clamp(source.a, 0.0, 1.0);
 #else
     float weight = 1.0;
 #endif
-    return vec4(weight * log(delta + l), weight, 0.0, 0.0);
+    return vec4(weight * log(delta + luminance), weight, 0.0, 0.0);
 }
 
 void main() {

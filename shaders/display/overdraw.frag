@@ -1,4 +1,4 @@
-// One for each fragment, added up by blending; what an alpha mask cuts away counts for nothing.
+// Counts fragments by additive blending. Fragments that fail the alpha test are not counted.
 #ifdef ALPHA_MASK
 #include <alpha_mask.glsl>
 #include <base_color.glsl>

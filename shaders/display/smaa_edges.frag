@@ -1,22 +1,22 @@
-// Edges of a finished picture: where brightness differs from the pixel's on the left, and from the one below. One that
-// stands beside a much stronger one is none: it is that one's blur.
+// Edge detection of SMAA: edges where the luma differs from that of the left and of the lower neighbour. An edge next
+// to a much stronger one is dropped, because it belongs to the blur of that one (local contrast adaptation).
 uniform sampler2D source;
 uniform float threshold;
 uniform float dominance;
 out vec2 edges;  // 1 on the left, below
 
-float bright_at(ivec2 texel) {
+float luma_at(ivec2 texel) {
     texel = clamp(texel, ivec2(0), textureSize(source, 0) - 1);
     return dot(texelFetch(source, texel, 0).rgb, vec3(0.2126, 0.7152, 0.0722));
 }
 
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
-    float here = bright_at(texel);
-    float left = bright_at(texel - ivec2(1, 0)), below = bright_at(texel - ivec2(0, 1));
-    vec2 step_here = abs(here - vec2(left, below));
-    vec2 beyond = abs(vec2(left - bright_at(texel - ivec2(2, 0)), below - bright_at(texel - ivec2(0, 2))));
-    vec2 behind = abs(here - vec2(bright_at(texel + ivec2(1, 0)), bright_at(texel + ivec2(0, 1))));
-    vec2 around = max(max(beyond, behind), step_here.yx);
-    edges = step(threshold, step_here) * step(max(around.x, around.y), dominance * step_here);
+    float center = luma_at(texel);
+    float left = luma_at(texel - ivec2(1, 0)), below = luma_at(texel - ivec2(0, 1));
+    vec2 difference = abs(center - vec2(left, below));
+    vec2 previous = abs(vec2(left - luma_at(texel - ivec2(2, 0)), below - luma_at(texel - ivec2(0, 2))));
+    vec2 next = abs(center - vec2(luma_at(texel + ivec2(1, 0)), luma_at(texel + ivec2(0, 1))));
+    vec2 strongest = max(max(previous, next), difference.yx);
+    edges = step(threshold, difference) * step(max(strongest.x, strongest.y), dominance * difference);
 }

@@ -3,17 +3,17 @@
 //
 //     vec3 tone_curve(vec3 color)
 //
-// from scene-linear after exposure, 0 to infinity, to display-linear; what leaves 0 to 1 is clipped.
+// that maps exposed scene-linear colour, from 0 to infinity, to display-linear. Results are clamped to 0 to 1.
 #if RADIANCE_SAMPLES > 1
 uniform sampler2DMS radiance;  // scene-linear
 #else
 uniform sampler2D radiance;  // scene-linear
 #endif
 #ifdef HAS_GAIN
-uniform sampler2D gain;      // one texel: a factor beside the stops
+uniform sampler2D gain;      // one texel: factor in addition to `exposure`
 #endif
 uniform float exposure;      // stops
-uniform float white;         // luminance after exposure, for curves that have one
+uniform float white;         // luminance after exposure that becomes white, for curves that use it
 out vec4 color;              // display-referred
 
 #include <CURVE>
@@ -37,7 +37,7 @@ void main() {
     }
     color = vec4(linear_to_srgb(sum / float(RADIANCE_SAMPLES)), 1.0);
 #if DITHER
-    color.rgb += (interleaved_gradient_noise(gl_FragCoord.xy) - 0.5) * (0.998 / 255.0);  // whole steps stay so
+    color.rgb += (interleaved_gradient_noise(gl_FragCoord.xy) - 0.5) * (0.998 / 255.0);  // keeps exact 8-bit values
 #endif
     if (broken)
         color.rgb = vec3(1.0, 0.0, 1.0);  // NaN is seen, and found in the picture

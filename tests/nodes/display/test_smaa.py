@@ -21,7 +21,7 @@ def height(shape: int, x: Any, whole: int) -> Any:
 
 
 def test_areas_are_integrals_of_lines(session: rg.Session) -> None:
-    areas = session.render(rg.load("smaa", size=(32, 18)), taps=["aa.areas"])["aa.areas"]
+    areas = session.render(rg.load("smaa", size=(32, 18)), taps=["aa.area_table"])["aa.area_table"]
     areas = np.asarray(areas[::-1], np.float64)  # the bottom row first
     side = LONGEST + 1
     assert areas.shape[:2] == (side, 9 * side)

@@ -113,10 +113,10 @@ def test_a_camera_that_turns(session: rg.Session, tmp_path: Path, camera: str) -
 def test_a_sharp_look_up_does_not_ring(session: rg.Session, tmp_path: Path) -> None:
     """Of frames that hold nothing but the ball's and the wall's light no mean is brighter or darker than both."""
     pipeline = with_scene(tmp_path, ORBIT, (96, 64)).set("aa.tolerance", 16.0)
-    frames = list(session.frames(pipeline, frames=range(1, 9), taps=["aa.gathered"]))
+    frames = list(session.frames(pipeline, frames=range(1, 9), taps=["aa.history"]))
     shown = [light(frame["image"]) for frame in session.frames(pipeline.set("aa.enabled", False), frames=range(1, 9))]
     least, most = np.min(shown), np.max(shown)
-    gathered = np.stack([frame["aa.gathered"][..., :3] for frame in frames])
+    gathered = np.stack([frame["aa.history"][..., :3] for frame in frames])
     assert gathered.min() > least - 0.003  # half floats, and the display's dither
     assert gathered.max() < most + 0.003
 

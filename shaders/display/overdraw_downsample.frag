@@ -1,7 +1,7 @@
-// A level of a chain of means and maxima: the exact area mean of the level above, and the most of what it covers.
+// One mip level of mean (x) and maximum (y): the exact area mean of the level above, and the maximum over it.
 #include <downsample.glsl>
 
-uniform sampler2D source;  // the level above; with FIRST the counts themselves
+uniform sampler2D source;  // the level above, or with FIRST the counts
 out vec2 level;
 
 vec4 source_texel(ivec2 texel) {
@@ -14,11 +14,11 @@ void main() {
     level.y = 0.0;
     for (int y = 0; y < 3; ++y) {
         for (int x = 0; x < 3; ++x) {
-            vec2 above = texelFetch(source, min(2 * texel + ivec2(x, y), size - 1), 0).xy;
+            vec2 source_level = texelFetch(source, min(2 * texel + ivec2(x, y), size - 1), 0).xy;
 #ifdef FIRST
-            above.y = above.x;
+            source_level.y = source_level.x;
 #endif
-            level.y = max(level.y, above.y);
+            level.y = max(level.y, source_level.y);
         }
     }
 }
