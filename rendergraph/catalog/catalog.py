@@ -10,8 +10,6 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from rendergraph.catalog import find, modules
-from rendergraph.catalog.extensions import GROUP as EXTENSIONS
-from rendergraph.catalog.extensions import extensions
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import NO_EXTENSIONS, Extensions, Node
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
@@ -55,7 +53,7 @@ class Catalog:
         named |= {path.resolve(): find.PluginPath(path) for path in plugin_paths}
         listed: dict[str, list[Listed]] = {}
         own = find.projects(path for path in named if path.is_dir())
-        offered = list(entry_points(GROUP, EXTENSIONS)) if installed else []
+        offered = list(entry_points(GROUP, find.EXTENSIONS)) if installed else []
         if own:
             offered = [entry for entry in offered if plain(entry.package.name) not in own]
         for entry in offered:
@@ -70,7 +68,7 @@ class Catalog:
                     raise
                 notes += [problem.as_warning() for problem in error.problems]
         folders = [(find.package_of(path), path) for path in named if path.is_dir()]
-        added = extensions(folders, [entry for entry in offered if entry.group == EXTENSIONS])
+        added = find.extensions(folders, [entry for entry in offered if entry.group == find.EXTENSIONS])
         return cls(listed, extensions=added, notes=tuple(notes))
 
     def with_file(self, name: str, file: Path) -> Catalog:

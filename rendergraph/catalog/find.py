@@ -1,4 +1,4 @@
-"""Listing of the node types of packages, folders and files; nothing is imported or parsed.
+"""Finding node types and what plugins add beside them, in packages, folders and files; no node is imported or parsed.
 
 A module is a node type, and so is a shader file. In a folder with Python files, and in a folder `shaders` beside
 `nodes`, a shader file is most likely part of a node; there it is a type only if it has a header.
@@ -10,23 +10,31 @@ import importlib.util
 import math
 import os
 import re
+import sys
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 from msgspec import Struct
 
 from rendergraph.catalog import header
-from rendergraph.catalog.extensions import MODULE
 from rendergraph.catalog.modules import PREFIX, fresh_package, shader_folder
 from rendergraph.catalog.types import SHADERS, Listed
-from rendergraph.errors import InputError, Place, Problem, shown_file
-from rendergraph.installed import plain
+from rendergraph.declare import Extension, Extensions, Source, extension_mistakes
+from rendergraph.declare.blame import describe_error, source_location
+from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
+from rendergraph.installed import EntryPoint, plain
 from rendergraph.settings import expand_home, nearest_settings
 from rendergraph.stamps import record_read
 
 OWN = "rendergraph"
 """The distribution that no plugin replaces."""
+EXTENSIONS = "rendergraph.extensions"
+"""The entry point group; an entry's value is `package.module:NAME`."""
+MODULE = "extension"
+NAME = "EXTENSION"
+"""The extension of a plugin's folder is `EXTENSION` in `extension.py`."""
 VARIABLE = "RENDERGRAPH_PATH"
 """Folders and files with nodes, separated as in PATH."""
 MOST_FILES = 10_000
@@ -199,3 +207,55 @@ def loose(named: PluginPath) -> Iterator[tuple[str, Listed]]:
         yield from _modules(folder, package, plugin, None)
     else:
         yield path.stem, Listed(f"{package}.{path.stem}", "", path, folder, plugin)
+
+
+def extensions(folders: Iterable[tuple[str, Path]], offered: Iterable[EntryPoint]) -> Extensions:
+    """Return what plugins add; nothing is imported before it is asked for."""
+    named, entries = tuple(folders), sorted(offered, key=lambda entry: entry.value)
+    return Extensions(lambda: _sources(named, entries))
+
+
+def _sources(folders: Iterable[tuple[str, Path]], offered: Iterable[EntryPoint]) -> Iterator[Source]:
+    for entry in offered:
+        yield _source(entry.package.name, _file(entry), entry.load, entry.value)
+    for package, folder in folders:
+        file = folder / f"{MODULE}.py"
+        record_read(file)
+        if file.is_file():
+            yield _source(folder.name, file, _loader(f"{package}.{MODULE}"), f"{MODULE}.py:{NAME}")
+
+
+def _loader(module: str) -> Callable[[], Any]:
+    return lambda: getattr(importlib.import_module(module), NAME)
+
+
+def _file(entry: EntryPoint) -> Path:
+    """The file of an entry's module, found without importing more than its parent; empty if there is none."""
+    try:
+        spec = importlib.util.find_spec(entry.module)
+    except BaseException as error:  # its parent fails to import, which loading will report
+        if is_interruption(error):
+            raise
+        spec = None
+    return Path(spec.origin) if spec is not None and spec.origin else Path()
+
+
+def _source(plugin: str, file: Path, load: Callable[[], Any], value: str) -> Source:
+    record_read(file)
+    place = Place(shown_file(file)) if file.name else None
+    try:
+        found = load()
+    except BaseException as error:  # whatever third-party code raises is a mistake in that code
+        if is_interruption(error):
+            raise
+        text = f"the extension of plugin '{plugin}' ({value}) cannot be imported: {describe_error(error)}"
+        where = (source_location(error, file.parent) if file.name else None) or place
+        return Source(plugin, file, None, (Problem("RG494", text, where),))
+    if not isinstance(found, Extension):
+        text = f"'{value}' of plugin '{plugin}' is {type(found).__name__}, not an Extension"
+        return Source(plugin, file, None, (Problem("RG495", text, place),))
+    defined = sys.modules.get(value.partition(":")[0])
+    file = file if file.name else Path(getattr(defined, "__file__", None) or "")
+    mistakes = extension_mistakes(found, file.parent)
+    problems = tuple(mistake.relocate(place, code="RG495", context=f"plugin '{plugin}'") for mistake in mistakes)
+    return Source(plugin, file, None if mistakes else found, problems)

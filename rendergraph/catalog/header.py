@@ -167,7 +167,6 @@ HEADER = Table(
         Key("threads", _THREADS, "Of a `.comp`: a texture that has a texel for each thread, or 1 to 3 numbers."),
     ),
 )
-"""What a header holds."""
 _CODES = Codes(unknown="RG440", wrong="RG440", name="RG440", file="RG440")
 
 

@@ -222,7 +222,7 @@ class Memory(Struct, eq=False, dict=True):
         moderngl cannot attach wrapped depth textures, mips or layers, so it is made over 1×1 renderbuffers, which raw
         calls then replace by the real attachments.
         """
-        key = (tuple(_key(c) for c in colors), _key(depth), size, color_mask, depth_mask, scissor, region)
+        key = (tuple(colors), depth, size, color_mask, depth_mask, scissor, region)
         if key in self._framebuffers:
             return self._framebuffers[key]
         stencil = depth is not None and FORMATS[depth.texture.desc.format].family == "depth_stencil"
@@ -319,10 +319,6 @@ class Memory(Struct, eq=False, dict=True):
         for table in (self._framebuffers, self._dummies, self._views, self._samplers):
             table.clear()
         self.physicals.clear()
-
-
-def _key(attachment: Attachment | None) -> tuple[object, ...] | None:
-    return None if attachment is None else (attachment.texture.glo, attachment.mip, attachment.layer)
 
 
 def clear_target(

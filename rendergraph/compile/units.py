@@ -41,9 +41,13 @@ class Units(Struct, eq=False):
         if len(self._pairs) < own:
             self._pairs[pair] = len(self._pairs)
             return self._pairs[pair]
-        unit = own + sum(isinstance(call, _Rebind) for call in taken)
-        taken.append(_Rebind(self, unit, textures, sampler))
+        unit = own + sum(isinstance(call, partial) and call.func == self._rebind for call in taken)
+        taken.append(partial(self._rebind, unit, textures, sampler))
         return unit
+
+    def _rebind(self, unit: int, textures: tuple[int, ...], sampler: int) -> None:
+        self.device.raw.glBindTextureUnit(unit, textures[self.parity % len(textures)])
+        self.device.raw.glBindSampler(unit, sampler)
 
     @property
     def _own(self) -> int:
@@ -69,27 +73,12 @@ class Units(Struct, eq=False):
         count = len(pairs)
         result: list[list[Callable[[], object]]] = []
         for parity in range(self.parities):
-            names = (ctypes.c_uint * max(1, count))(*(t[parity % len(t)] for t, _ in pairs))
-            samplers = (ctypes.c_uint * max(1, count))(*(sampler for _, sampler in pairs))
+            names = (ctypes.c_uint * count)(*(t[parity % len(t)] for t, _ in pairs))
+            samplers = (ctypes.c_uint * count)(*(sampler for _, sampler in pairs))
             calls: list[Callable[[], object]] = []
             if count:
-                calls = [
-                    partial(raw.glBindTextures, 0, count, names),
-                    partial(raw.glBindSamplers, 0, count, samplers),
-                ]
+                calls += [partial(raw.glBindTextures, 0, count, names), partial(raw.glBindSamplers, 0, count, samplers)]
             if self.parities > 1:
                 calls.append(partial(setattr, self, "parity", parity))
             result.append(calls)
         return result
-
-
-class _Rebind:
-    """Binds one pair to a shared unit: the texture of the frame's parity."""
-
-    def __init__(self, units: Units, unit: int, textures: tuple[int, ...], sampler: int) -> None:
-        self._units, self._unit, self._textures, self._sampler = units, unit, textures, sampler
-
-    def __call__(self) -> None:
-        raw = self._units.device.raw
-        raw.glBindTextureUnit(self._unit, self._textures[self._units.parity % len(self._textures)])
-        raw.glBindSampler(self._unit, self._sampler)

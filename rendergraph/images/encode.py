@@ -26,7 +26,6 @@ EXTENSIONS: dict[str, str] = {".png": "png", ".jpg": "jpeg", ".jpeg": "jpeg", ".
 """Extension, in lower case, to OpenImageIO's name of the format."""
 HALF_MAX = 65504.0
 PREFIX = "rendergraph:"
-"""What our metadata's names begin with."""
 
 _NAMES = {1: ("Y",), 2: ("R", "G"), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
 _EXACT_INTEGER = 1 << 24

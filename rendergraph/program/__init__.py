@@ -21,9 +21,9 @@ from rendergraph.program.checks import named_reads as named_reads
 from rendergraph.program.checks import unfit_outputs as unfit_outputs
 from rendergraph.program.checks import unfit_sampler as unfit_sampler
 from rendergraph.program.checks import used_blocks as used_blocks
-from rendergraph.program.macros import positions_macro as positions_macro
 from rendergraph.program.text import StageText as StageText
 from rendergraph.program.text import StepTexts as StepTexts
+from rendergraph.program.text import positions_macro as positions_macro
 from rendergraph.program.text import prefix as prefix
 from rendergraph.program.text import stage_texts as stage_texts
 from rendergraph.program.text import text_key as text_key

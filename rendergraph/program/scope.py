@@ -13,8 +13,7 @@ from rendergraph.expand import ViewTable
 from rendergraph.glsl.globals import Global, globals_of
 from rendergraph.glsl.names import declared, without_directives
 from rendergraph.glsl.source import Origin, SourceText
-from rendergraph.program.macros import read_defines
-from rendergraph.program.text import StageText, prefix, screen_reads, signatures_of
+from rendergraph.program.text import StageText, prefix, read_defines, screen_reads, signatures_of
 from rendergraph.resources import folder
 from rendergraph.scene.pack import SLOTS
 from rendergraph.steps import Read, Resource, Step
@@ -23,7 +22,6 @@ from rendergraph.textures import FORMATS, GLSL_SHAPES, TextureDesc
 _BLOCK = re.compile(r"\b(?:uniform|buffer)\s+(\w+)\s*\{([^{}]*)\}")
 
 SECTIONS = ("textures", "uniforms", "blocks", "macros", "functions", "includes", "attributes", "varyings", "outputs")
-"""In the order of printing."""
 
 
 @dataclass(frozen=True)

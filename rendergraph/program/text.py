@@ -18,7 +18,6 @@ from rendergraph.expand import ViewTable
 from rendergraph.glsl.files import Links
 from rendergraph.glsl.names import calls, declared, mentions, renamed
 from rendergraph.glsl.source import Includes, Origin, SourceBlock, SourceText, find_old_names, generated
-from rendergraph.program.macros import macro_text, read_defines, sample_macros, used_macros
 from rendergraph.resources import folder
 from rendergraph.stamps import FileCache
 from rendergraph.steps import FunctionBinding, Read, Resource, Step, Write
@@ -88,7 +87,7 @@ def stage_texts(
         shaders.setdefault("vertex", "<fullscreen.vert>")
     macros = {**read_defines(step.reads, resources, views), **dict(step.defines), **(defines or {})}
     if step.kind != "compute":
-        macros = {**dict(sample_macros("PASS", step.samples)), **macros}
+        macros = {**_sample_macros("PASS", step.samples), **macros}
     program = _Program(step, types, resources, views, macros)
     texts: dict[str, StageText] = {}
     for stage in ("vertex", "geometry", "fragment", "compute"):
@@ -202,7 +201,7 @@ class _Program(Struct, frozen=True):
         declarations = _read_declarations(step.reads, self.resources, "", body)
         text = view + declarations + functions + source
         aliases, warnings = find_old_names(text, include_folder)
-        head = generated([VERSION, *extensions]) + macro_text({**aliases, **used_macros(self.macros, text.text)})
+        head = generated([VERSION, *extensions]) + _macro_text({**aliases, **_used_macros(self.macros, text.text)})
         return StageText(stage, head + text, step.node, tuple(warnings))
 
     def _functions(self, stage: str, signature: Signature, includes: Includes) -> SourceText:
@@ -276,7 +275,7 @@ class _Program(Struct, frozen=True):
                 for block in source.blocks
             )
         )
-        head = macro_text({before + key: renamed(value, rename) for key, value in macros.items()})
+        head = _macro_text({before + key: renamed(value, rename) for key, value in macros.items()})
         return head + _read_declarations(binding.reads, self.resources, before, final.text) + final
 
 
@@ -359,3 +358,54 @@ def _screen_factors(read: Read, lights: tuple[int, ...], signature: Signature) -
         f"for (int layer = 0; layer < {len(lights)}; ++layer)",
         f"    if ({read.name}_table[layer] == {light}) {join}{fetch.format('layer')};",
     ]
+
+
+def read_defines(
+    reads: Iterable[Read], resources: Mapping[str, Resource], views: Mapping[str, ViewTable]
+) -> dict[str, str]:
+    """Return `<X>_LAYERS`, `<X>_SAMPLES`, `<X>_VIEW_COUNT` of textures read, `<X>_COUNT` of lists of inputs."""
+    macros: dict[str, str] = {}
+    counts: dict[str, int] = {}
+    for read in reads:
+        resource = resources.get(read.resource)
+        if resource is None or not isinstance(resource.desc, TextureDesc) or read.use == "attach":
+            continue
+        name = read.name.upper()
+        macros[f"{name}_LAYERS"] = str(resource.desc.layers)
+        macros |= _sample_macros(name, resource.desc.samples)
+        if resource.view is not None:
+            macros[f"{name}_VIEW_COUNT"] = str(views.get(resource.view, ViewTable()).count)
+        if match := re.match(r"(.+)_(\d+)\Z", name):
+            counts[match[1]] = max(counts.get(match[1], 0), int(match[2]) + 1)
+    return {f"{name}_COUNT": str(count) for name, count in counts.items()} | macros
+
+
+def _sample_macros(name: str, samples: int) -> dict[str, str]:
+    """Return `<X>_SAMPLES`, and for several samples their positions in the texel."""
+    positions = {f"{name}_SAMPLE_POSITIONS": positions_macro(samples)} if samples > 1 else {}
+    return {f"{name}_SAMPLES": str(samples), **positions}
+
+
+def positions_macro(samples: int) -> str:
+    """Return the macro of the device's sample positions; its value is known only with GL."""
+    return f"SAMPLE_POSITIONS_{samples}"
+
+
+def _used_macros(macros: Mapping[str, str], text: str) -> dict[str, str]:
+    """Return the macros whose names occur in a text or in the value of such a macro.
+
+    The others would only make different programs of equal ones: a blur is the same for any number of lights.
+    """
+    found: dict[str, str] = {}
+    texts = [text]
+    while texts:
+        new = {name: macros[name] for name in macros if name not in found and any(name in text for text in texts)}
+        found |= new
+        texts = list(new.values())
+    return {name: macros[name] for name in macros if name in found}
+
+
+def _macro_text(macros: Mapping[str, str]) -> SourceText:
+    return SourceText.of(
+        (f"#define {key} {value}".rstrip(), Origin(made=f"the macro {key}")) for key, value in macros.items()
+    )

@@ -179,5 +179,4 @@ SCENE = Table(
         Key("orbit", ORBIT, "A camera that turns about its target."),
     ),
 )
-"""What a scene file holds."""
 CODES = Codes(unknown="RG320", wrong="RG321", name="RG321", file="RG321")

@@ -67,7 +67,7 @@ def test_what_a_geometry_step_may_use() -> None:
 def test_its_own_textures_and_steps_defines() -> None:
     scopes = [scope for step, _, _, scope in programs(rg.load("ssao-hemisphere")) if step.node == "ao"]
     sources = {one.source for scope in scopes for one in scope}
-    assert "its own 'whole'" in sources
+    assert "its own 'full_surfaces'" in sources
     assert any(one.section == "textures" and one.source.startswith("input 'normal'") for s in scopes for one in s)
 
 
