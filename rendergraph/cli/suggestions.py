@@ -56,12 +56,15 @@ def _meant(name: str, context: click.Context) -> str:
     own = _options(context.command)
     for advice, words in MEANINGS.items():
         if word in words.split():
-            known = advice.startswith("rendergraph") or advice.partition(" ")[0] in own
+            picture = (
+                advice.startswith("-o ") and "." in advice and context.command.name != "run"
+            )  # other verbs write other files
+            known = advice.startswith("rendergraph") or (advice.partition(" ")[0] in own and not picture)
             return f"; did you mean '{advice}'" + ("?" if known else " of `rendergraph run`?")
     for reason, words in NEEDLESS.items():
         if word in words.split():
             return f"; leave it out: {reason}"
-    if (near := nearest(word, {option.removeprefix("--") for option in own}, floor=_FLOOR)) is not None:
+    if (near := nearest(word, {option[2:] for option in own if option.startswith("--")}, floor=_FLOOR)) is not None:
         return f"; did you mean '--{near}'?"
     root = context.find_root()
     assert isinstance(root.command, click.Group)

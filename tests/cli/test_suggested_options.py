@@ -45,6 +45,8 @@ from rendergraph.cli.suggestions import MEANINGS, NEEDLESS
         ("run forward --stats", "did you mean 'rendergraph bench'?"),
         ("run forward --version", "did you mean 'rendergraph --version'?"),
         ("plan forward --gif", "did you mean '-o film.mp4' of `rendergraph run`?"),
+        ("compare forward --outfile a.html", "did you mean '-o FILE'?"),
+        ("compare forward --gif", "did you mean '-o film.mp4' of `rendergraph run`?"),
         ("run forward --against deferred", "it is an option of `view`; see"),
         ("run forward --fraems 1-2", "did you mean '--frames'?"),
         ("run forward --env sky", "did you mean '--environment'?"),

@@ -88,7 +88,7 @@ def test_a_lighting_shader_with_old_names_draws_the_same(author: Any, gl: rg.Ses
             if age == "old"
             else []
         )
-    assert np.array_equal(*pictures)
+    assert np.array_equal(pictures[0], pictures[1])
     assert pictures[0].max() > 0
 
 
@@ -104,7 +104,7 @@ def test_a_shading_model_with_old_names_draws_the_same(gl: rg.Session, tmp_path:
         pipeline = rg.load("forward", plugins=[tmp_path], size=(24, 16)).set("light.shading", age)
         pictures.append(gl.render(pipeline)["image"])
         assert [problem.code for problem in pipeline.check().warnings] == ["RG449"] * (3 if age == "old" else 0)
-    assert np.array_equal(*pictures)
+    assert np.array_equal(pictures[0], pictures[1])
 
 
 def test_an_old_include_is_found(author: Any) -> None:
