@@ -159,8 +159,8 @@ def ssim(a: Pixels, b: Pixels) -> float:
     Pictures with a side under 11 pixels are continued by reflection.
     """
     if min(a.shape[:2]) < _WINDOW:
-        around = [(_WINDOW // 2,) * 2] * 2 + [(0, 0)]
-        a, b = (np.pad(x, around, mode="symmetric") for x in (a, b))
+        padding = [(_WINDOW // 2,) * 2] * 2 + [(0, 0)]
+        a, b = (np.pad(x, padding, mode="symmetric") for x in (a, b))
     return float(np.mean([_ssim(a[..., channel], b[..., channel]) for channel in range(a.shape[-1])]))
 
 

@@ -108,7 +108,7 @@ class _Check:
                 case {"failed": [*problems], "exit_code": int(code)}:
                     if found := _problems(problems):
                         raise _ERRORS.get(code, RenderError)(found)
-        raise InputError(self._ended())
+        raise InputError(self._exit_problem())
 
     def _messages(self) -> Iterator[object]:
         """Yield messages until the process ends or closes its pipe; raises InputError where a stage takes too long."""
@@ -131,7 +131,7 @@ class _Check:
                         yield _decode(line)
                         end = time.monotonic() + self._seconds()
             if time.monotonic() >= end:
-                raise InputError(self._too_slow())
+                raise InputError(self._timeout_problem())
             if not ready and self._process.poll() is not None:
                 return  # a process that it has started may still hold the pipe
 
@@ -145,7 +145,7 @@ class _Check:
         stages = {"import": "while it is imported", "pass": f"in variant '{self._variant}'"}
         return stages.get(self._stage, "at the start")
 
-    def _too_slow(self) -> Problem:
+    def _timeout_problem(self) -> Problem:
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGUSR1)  # the fault handler writes the current line
             time.sleep(0.2)
@@ -153,11 +153,11 @@ class _Check:
         text = f"it takes longer than {self._seconds():g} s {self._during()}; --limit {name}=N allows more"
         return Problem("RG452", text, self._place())
 
-    def _ended(self) -> Problem:
+    def _exit_problem(self) -> Problem:
         try:
             status = self._process.wait(self._seconds())
         except subprocess.TimeoutExpired:  # it has closed its pipe and goes on
-            return self._too_slow()
+            return self._timeout_problem()
         lines = self._output.decode("utf-8", "replace").strip().splitlines()
         last = f"; its last output: {lines[-1][:200]}" if lines else ""
         if status >= 0:

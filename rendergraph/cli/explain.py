@@ -60,8 +60,8 @@ def command(topic: str, glsl: bool, pipeline: str | None, step: int | None, sele
     if not glsl and (pipeline or step is not None or select(topic) != Selection(topic, plugins=plugins)):
         raise UsageError(Problem("RG500", "--pipeline, --step and options that change a pipeline require --glsl"))
     if pipeline is not None:
-        found = reference.describe_program(options.link(select(pipeline)), topic, step)
-        _print(found, _program_text, as_json)
+        entry = reference.describe_program(options.link(select(pipeline)), topic, step)
+        _print(entry, _program_text, as_json)
     elif re.fullmatch(r"[Rr][Gg]\d+", topic):
         _print(reference.error_page(topic.upper()), _error_text, as_json)
     elif topic in reference.FILE_KINDS:
@@ -98,11 +98,11 @@ def _node_or_file(
     if any("added" in parameter for parameter in described["parameters"]):
         warn(catalog.extensions.warnings)
     warn(node_type.warnings)
-    _print(file | described, lambda found: sections(_node_text(found), file_text), as_json)
+    _print(file | described, lambda entry: sections(_node_text(entry), file_text), as_json)
 
 
-def _print(found: Entry, text_of: Callable[[Entry], str], as_json: bool) -> None:
-    emit_json(found) if as_json else emit(text_of(found))
+def _print(entry: Entry, text_of: Callable[[Entry], str], as_json: bool) -> None:
+    emit_json(entry) if as_json else emit(text_of(entry))
 
 
 def _unknown(topic: str, types: Any, shader_suffixes: tuple[str, ...]) -> str:
@@ -133,57 +133,57 @@ def _file(topic: str, select: Select, catalog: Any) -> tuple[Entry, str]:
     """Describe the pipeline or scene that a topic names, also as text; empty where it names neither."""
     kind = reference.kind_of(topic)
     if kind == "pipeline":
-        found = reference.describe_pipeline(topic, options.link(select(topic)))
-        return found, _pipeline_text(found)
+        entry = reference.describe_pipeline(topic, options.link(select(topic)))
+        return entry, _pipeline_text(entry)
     if kind == "scene":
         from rendergraph.scene.load import load
 
         path = shipped_scenes().get(topic) or Path(topic)
         scene = load(path, extensions=catalog.extensions)
         warn(scene.warnings)
-        found = reference.describe_scene(topic, path, scene)
-        return found, _scene_text(found)
+        entry = reference.describe_scene(topic, path, scene)
+        return entry, _scene_text(entry)
     return {}, ""
 
 
 # --- text ------------------------------------------------------------------------------------------------------------
 
 
-def _pipeline_text(found: Entry) -> str:
-    width, height = found["size"]
-    scene = f"Renders {found['scene']}" if found["scene"] else "Renders no scene"
-    outputs = ", ".join(f"{name} ({end})" for name, end in found["outputs"].items())
-    nodes = [(node["id"], node["type"], node["line"]) for node in found["nodes"]]
+def _pipeline_text(entry: Entry) -> str:
+    width, height = entry["size"]
+    scene = f"Renders {entry['scene']}" if entry["scene"] else "Renders no scene"
+    outputs = ", ".join(f"{name} ({end})" for name, end in entry["outputs"].items())
+    nodes = [(node["id"], node["type"], node["line"]) for node in entry["nodes"]]
     return sections(
-        f"{found['pipeline']}  (pipeline)",
-        found["line"],
+        f"{entry['pipeline']}  (pipeline)",
+        entry["line"],
         f"{scene}, {width}×{height}; outputs {outputs}.",
         section("Nodes", nodes, ("id", "type", "result")),
-        section("Parameters", list(found["parameters"].items())),
-        section("File", found["text"]),
-        f"`rendergraph graph {found['name']}` draws its graph, "
-        f"`rendergraph config {found['name']}` prints it with everything that it extends.",
+        section("Parameters", list(entry["parameters"].items())),
+        section("File", entry["text"]),
+        f"`rendergraph graph {entry['name']}` draws its graph, "
+        f"`rendergraph config {entry['name']}` prints it with everything that it extends.",
     )
 
 
 _MOST_OBJECTS = 40
 
 
-def _scene_text(found: Entry) -> str:
+def _scene_text(entry: Entry) -> str:
     objects = [
         (one["name"], one["triangles"], one["material"], "" if one["casts_shadow"] else "casts no shadow")
-        for one in found["objects"][:_MOST_OBJECTS]
+        for one in entry["objects"][:_MOST_OBJECTS]
     ]
-    more = len(found["objects"]) - len(objects)
+    more = len(entry["objects"]) - len(objects)
     listing = section("Objects", objects, ("name", "triangles", "material", ""), right=(1,))
     return sections(
-        f"{found['scene']}  (scene, {found['triangles']} triangles{', animated' if found['moves'] else ''})",
-        found["line"],
+        f"{entry['scene']}  (scene, {entry['triangles']} triangles{', animated' if entry['moves'] else ''})",
+        entry["line"],
         listing + (f"\n  and {more} more" if more else ""),
-        section("Lights", [(one["name"], one["line"]) for one in found["lights"]]),
-        section("Cameras", [(one["name"], one["line"]) for one in found["cameras"]]),
-        *found["added"],
-        f"`rendergraph run forward --scene {found['name']}` renders it.",
+        section("Lights", [(one["name"], one["line"]) for one in entry["lights"]]),
+        section("Cameras", [(one["name"], one["line"]) for one in entry["cameras"]]),
+        *entry["added"],
+        f"`rendergraph run forward --scene {entry['name']}` renders it.",
     )
 
 
@@ -196,10 +196,10 @@ def _error_text(page: Entry) -> str:
     )
 
 
-def _keys_text(found: Entry) -> str:
-    kind = found["file"]
+def _keys_text(entry: Entry) -> str:
+    kind = entry["file"]
     tables = []
-    for title, keys in groupby(found["keys"], key=lambda row: row["section"]):
+    for title, keys in groupby(entry["keys"], key=lambda row: row["section"]):
         rows = [(row["key"], row["value"], row["unit"], _default(row), row["doc"]) for row in keys]
         tables.append(section(title, rows))
     return sections(
@@ -264,20 +264,20 @@ _SCOPE_TITLES = {
 _WIDE = 64
 
 
-def _program_text(found: Entry) -> str:
+def _program_text(entry: Entry) -> str:
     """The program as GLSL; everything else is in comments."""
-    lines = [f"step {found['step']} of {node_named(found['node'], found['type'])} in pipeline '{found['pipeline']}'"]
-    if len(found["steps"]) > 1:
+    lines = [f"step {entry['step']} of {node_named(entry['node'], entry['type'])} in pipeline '{entry['pipeline']}'"]
+    if len(entry["steps"]) > 1:
         lines.append("steps with a program; --step N selects one:")
-        for one in found["steps"]:
+        for one in entry["steps"]:
             shaders = ", ".join(one["shaders"].values())
             lines.append(f"  {one['step']}  {one['kind']}  {shaders}  {one['label']}".rstrip())
-    if found["variants"] == 0:
+    if entry["variants"] == 0:
         lines.append("it draws nothing of this scene")
-    elif found["variants"] > 1:
-        differing = ", ".join(found["differ"])
-        lines.append(f"the first of {amount(found['variants'], 'variant')}, which differ in {differing}")
-    for title, members in groupby(found["scope"], key=lambda one: one["section"]):
+    elif entry["variants"] > 1:
+        differing = ", ".join(entry["differ"])
+        lines.append(f"the first of {amount(entry['variants'], 'variant')}, which differ in {differing}")
+    for title, members in groupby(entry["scope"], key=lambda one: one["section"]):
         rows = [(one["name"], one["source"]) for one in members]
         width = max((len(name) for name, _ in rows if len(name) < _WIDE), default=0)
         lines += ["", _SCOPE_TITLES[title]]
@@ -287,5 +287,5 @@ def _program_text(found: Entry) -> str:
             else:
                 lines += [f"  {name}", *textwrap.wrap(source, 100, initial_indent=" " * 6, subsequent_indent=" " * 6)]
     head = "\n".join(f"// {line}".rstrip() for line in lines)
-    stages = [f"// {'=' * 20} {stage} shader\n\n{one['annotated']}" for stage, one in found["stages"].items()]
+    stages = [f"// {'=' * 20} {stage} shader\n\n{one['annotated']}" for stage, one in entry["stages"].items()]
     return sections(head, *stages).rstrip()

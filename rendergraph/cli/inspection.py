@@ -242,17 +242,17 @@ def schema(what: str, plugins: tuple[Path, ...], output: Path | None, as_json: b
         from rendergraph.compare.export.table import csv_schema  # slower to import than the rest
         from rendergraph.compare.store import line_schema
 
-        found = line_schema() if what == "results" else csv_schema()
+        document = line_schema() if what == "results" else csv_schema()
     else:
-        found = _of_pipelines(what, plugins) if what not in ("scene", "sweep") else _of_table(what)
-    options.put(json.dumps(found, indent=2, ensure_ascii=False), output, as_json=as_json)
+        document = _of_pipelines(what, plugins) if what not in ("scene", "sweep") else _of_table(what)
+    options.put(json.dumps(document, indent=2, ensure_ascii=False), output, as_json=as_json)
 
 
 def _of_table(what: str) -> Schema:
     from rendergraph.keys import as_markdown, file_schema
 
-    found: Schema = as_markdown(file_schema(reference.table_of(what)))
-    return found
+    document: Schema = as_markdown(file_schema(reference.table_of(what)))
+    return document
 
 
 def _of_pipelines(what: str, plugins: tuple[Path, ...]) -> Schema:
@@ -270,7 +270,7 @@ def _of_pipelines(what: str, plugins: tuple[Path, ...]) -> Schema:
         spec = resolve(Path(what), catalog=catalog)
         bases |= base_of(Path(what), spec)
         catalog = spec.catalog or catalog  # with the shader files it names
-    found = schema(catalog, bases)
+    document = schema(catalog, bases)
     warn([problem.as_warning() for problem in catalog.usable()[1]])
     warn(catalog.extensions.warnings)
-    return found
+    return document

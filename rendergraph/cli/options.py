@@ -72,15 +72,15 @@ class NamedPath(click.Path):
 
 
 def _size(text: str) -> tuple[int, int]:
-    found = re.fullmatch(r"([0-9]{1,9})[x×]([0-9]{1,9})", text)
-    if not found or int(found[1]) < 1 or int(found[2]) < 1:
+    match = re.fullmatch(r"([0-9]{1,9})[x×]([0-9]{1,9})", text)
+    if not match or int(match[1]) < 1 or int(match[2]) < 1:
         raise ValueError(f"'{text}' is not WIDTHxHEIGHT, as in 1280x720")
-    return int(found[1]), int(found[2])
+    return int(match[1]), int(match[2])
 
 
 def _frames(text: str) -> range:
-    found = re.fullmatch(r"([0-9]{1,9})(?:-([0-9]{1,9}))?", text)
-    first, last = (int(found[1]), int(found[2] or found[1])) if found else (0, 0)
+    match = re.fullmatch(r"([0-9]{1,9})(?:-([0-9]{1,9}))?", text)
+    first, last = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
     if not 1 <= first <= last:
         raise ValueError(f"'{text}' is not FIRST-LAST, as in 1-10; frame 1 is the first")
     return range(first, last + 1)
@@ -101,19 +101,19 @@ def settings(text: str) -> tuple[str, ...]:
 
 
 def _output(text: str) -> Target:
-    found = re.fullmatch(rf"(?:({_NAME})=)?(.*)", text, re.DOTALL)
-    assert found
-    return Target(found[1] or "", _picture(found[2], text))
+    match = re.fullmatch(rf"(?:({_NAME})=)?(.*)", text, re.DOTALL)
+    assert match
+    return Target(match[1] or "", _picture(match[2], text))
 
 
 def _tap(text: str) -> Target:
     from rendergraph.session.selection import TEXTURE_PART
 
-    found = re.fullmatch(rf"(?P<name>{_NODE}\.\w+{TEXTURE_PART})=(?P<file>.*)", text, re.DOTALL)
-    if not found:
+    match = re.fullmatch(rf"(?P<name>{_NODE}\.\w+{TEXTURE_PART})=(?P<file>.*)", text, re.DOTALL)
+    if not match:
         parts = "'sun.shadow_map[1]=…', 'bloom.glow[mip=1]=…', 'light.marks:stencil=…'"
         raise ValueError(f"'{text}' is not NODE.PORT=FILE, as in sun.shadow_map=depth.exr; for a part: {parts}")
-    return Target(found["name"], _picture(found["file"], text), is_tap=True)
+    return Target(match["name"], _picture(match["file"], text), is_tap=True)
 
 
 def _picture(name: str, text: str) -> Path:
@@ -312,23 +312,23 @@ def linked(selection: Selection) -> Pipeline:
 def link(selection: Selection) -> Linked:
     from rendergraph.session import stages
 
-    found = stages.link(stages.resolve(selection))
-    warn(found.warnings)
-    return found
+    linked = stages.link(stages.resolve(selection))
+    warn(linked.warnings)
+    return linked
 
 
 def sketch(selection: Selection) -> Linked:
     """Resolve and link a graph in which node types may be missing; print these and other warnings."""
     from rendergraph.session import stages
 
-    found = stages.sketch(stages.resolve(selection))
-    warn(found.warnings)
-    return found
+    linked = stages.sketch(stages.resolve(selection))
+    warn(linked.warnings)
+    return linked
 
 
 def exit_if_missing(*sketches: Linked) -> None:
     """Exit as for a wrong file where node types are missing, after everything else was printed."""
-    if any(found.missing for found in sketches):
+    if any(linked.missing for linked in sketches):
         click.get_current_context().exit(InputError.exit_code)
 
 

@@ -309,30 +309,30 @@ def draw_in_parts(
     from rendergraph.images.files import write_file
     from rendergraph.images.video import films, is_film
 
-    said = expanded.linked.spec.tree.get("warm_up")
-    wanted = [FrameFile(t.name, "" if is_film(t.path) else t.path.suffix, t.is_tap) for t in targets]
-    chunks = split_frames(expanded, wanted, farm.workers, None if said is None else int(said.plain()))
+    warm_up = expanded.linked.spec.tree.get("warm_up")
+    files = [FrameFile(t.name, "" if is_film(t.path) else t.path.suffix, t.is_tap) for t in targets]
+    chunks = split_frames(expanded, files, farm.workers, None if warm_up is None else int(warm_up.plain()))
     frames, written = expanded.options.frames, dict[int, list[str]]()
     progress, lasts = Progress(len(frames)), list["Frame"]()
     with films([t.path for t in targets if is_film(t.path)], expanded.options.fps, frames[0]) as open_films:
-        for shown in render_chunks(farm, chunks):
-            if not isinstance(shown, RenderedFrame):
-                lasts.append(shown)
+        for item in render_chunks(farm, chunks):
+            if not isinstance(item, RenderedFrame):
+                lasts.append(item)
                 continue
-            paths = written.setdefault(shown.number, [])
-            for target, made in zip(targets, shown.files, strict=True):
-                if not isinstance(made, bytes):
-                    open_films[target.path].add(shown.number, made)
+            paths = written.setdefault(item.number, [])
+            for target, data in zip(targets, item.files, strict=True):
+                if not isinstance(data, bytes):
+                    open_films[target.path].add(item.number, data)
                     continue
-                path = images.numbered(target.path, shown.number)
-                write_file(path, made)
+                path = images.numbered(target.path, item.number)
+                write_file(path, data)
                 paths.append(str(path))
                 if not quiet:
                     progress.clear()
                     emit(str(path))
             progress.show(len(written))
             if quiet:
-                say_event({"event": "frame", "frame": shown.number, "done": len(written), "of": len(frames)})
+                say_event({"event": "frame", "frame": item.number, "done": len(written), "of": len(frames)})
     progress.clear()
     lasts.sort(key=lambda frame: frame.number)
     warnings.say([problem for frame in lasts for problem in frame.warnings])

@@ -160,47 +160,47 @@ def command(
         raise UsageError(Problem("RG500", "a sweep needs a folder for its runs: -o DIR; --list needs none"))
     try:
         with at_its_lines(file):
-            found = (search if how.minimise else sweep)(base, space, out, against, how)
+            outcome = (search if how.minimise else sweep)(base, space, out, against, how)
     except KeyboardInterrupt:
         kept = kept_runs(out)
         way = f"; continue with: {options.command_line()} --resume" if kept else ""
         say(f"{amount(kept, 'run')} kept in {out}{way}")
         raise
-    warn([*found.comparison.warnings, *extensions.warnings])
-    if found.timed:
-        say(f"{amount(found.timed, 'run')} reused, timed again over {amount(how.frames, 'frame')}")
-    if found.redrawn:
-        say(f"{amount(found.redrawn, 'run')} rendered again: their input files or pictures have changed")
-    if found.torn:
-        say(f"{amount(found.torn, 'incomplete line')} in results.jsonl skipped; affected runs repeated")
-    files = _write_files(found, out, title=title, note=note, as_csv=as_csv)
-    beyond = shared.exceeded(found.comparison.results, thresholds)
+    warn([*outcome.comparison.warnings, *extensions.warnings])
+    if outcome.timed:
+        say(f"{amount(outcome.timed, 'run')} reused, timed again over {amount(how.frames, 'frame')}")
+    if outcome.redrawn:
+        say(f"{amount(outcome.redrawn, 'run')} rendered again: their input files or pictures have changed")
+    if outcome.torn:
+        say(f"{amount(outcome.torn, 'incomplete line')} in results.jsonl skipped; affected runs repeated")
+    files = _write_files(outcome, out, title=title, note=note, as_csv=as_csv)
+    beyond = shared.exceeded(outcome.comparison.results, thresholds)
     if as_json:
-        emit_json(found.as_json() | {name: str(path) for name, path in files.items()} | {"exceeded": beyond})
+        emit_json(outcome.as_json() | {name: str(path) for name, path in files.items()} | {"exceeded": beyond})
     else:
-        emit(_text(found))
+        emit(_text(outcome))
         for path in files.values():
             emit(str(path))
-    for text in (*beyond, *(f"{failure.name} failed: {failure.text}" for failure in found.failures)):
+    for text in (*beyond, *(f"{failure.name} failed: {failure.text}" for failure in outcome.failures)):
         say(text, always=True)
-    if found.failures:
+    if outcome.failures:
         raise click.exceptions.Exit(RenderError.exit_code)
     if beyond:
         raise click.exceptions.Exit(shared.BEYOND)
 
 
-def _write_files(found: Sweep, out: Path, *, title: str, note: str, as_csv: bool) -> dict[str, Path]:
+def _write_files(outcome: Sweep, out: Path, *, title: str, note: str, as_csv: bool) -> dict[str, Path]:
     from rendergraph.compare.export.table import csv_text
     from rendergraph.compare.report import quality_svg, sweep_page
 
     files: dict[str, Path] = {}
-    if found.comparison.results:  # not all runs have failed
+    if outcome.comparison.results:  # not all runs have failed
         files |= {"chart": out / "quality.svg", "report": out / "report.html"}
-        options.write(sweep_page(found, options.command_line(), title=title, note=note), files["report"])
-        options.write(quality_svg(found.comparison), files["chart"])
+        options.write(sweep_page(outcome, options.command_line(), title=title, note=note), files["report"])
+        options.write(quality_svg(outcome.comparison), files["chart"])
     if as_csv:
         files["csv"] = out / "results.csv"
-        options.write(csv_text(found), files["csv"])
+        options.write(csv_text(outcome), files["csv"])
     return files
 
 
@@ -264,23 +264,23 @@ def with_file(file: SweepFile, select: options.Select) -> options.Select:
     return selected
 
 
-def _text(found: Sweep) -> str:
+def _text(outcome: Sweep) -> str:
     from rendergraph.compare.results import pareto
 
-    comparison = found.comparison
+    comparison = outcome.comparison
     front = {result.name for result in pareto(comparison.results)}
     heads, rows = shared.summary(comparison.results)
     heads, rows = (*heads, "Pareto"), [(*row, "front" if row[0] in front else "") for row in rows]
     lines = [
         f"{amount(len(rows), 'run')} against {comparison.reference.name}: "
-        f"{amount(found.executed, 'pass', 'passes')} executed, {found.alone} one by one"
-        + (f"; {amount(found.resumed, 'run')} reused" if found.resumed else "")
-        + (f"; {amount(len(found.failures), 'run')} failed" if found.failures else ""),
+        f"{amount(outcome.executed, 'pass', 'passes')} executed, {outcome.alone} one by one"
+        + (f"; {amount(outcome.resumed, 'run')} reused" if outcome.resumed else "")
+        + (f"; {amount(len(outcome.failures), 'run')} failed" if outcome.failures else ""),
         table(rows, heads, right=range(1, len(heads) - 1)),
     ]
     if comparison.software:
         lines.append(shared.SOFTWARE)
-    if (search := found.search) is not None:
+    if (search := outcome.search) is not None:
         front_rows = [(name, *map(_value, search.values[name])) for name in search.front]
         lines.append(table(front_rows, ("minimum", *search.minimise)))
     return "\n".join(lines)
@@ -290,16 +290,16 @@ def _value(value: float) -> str:
     return f"{value:.0f}" if value >= 1e4 else f"{value:.4g}"
 
 
-def _show(found: Listing) -> None:
-    document, runs = found.as_json(), found.prepared.runs
+def _show(outcome: Listing) -> None:
+    document, runs = outcome.as_json(), outcome.prepared.runs
     emit(
         f"{amount(len(runs), 'run')} against {document['reference']}: "
-        f"{amount(found.executed, 'pass', 'passes')} to execute, {document['passes_one_by_one']} one by one"
-        + (f"; {amount(len(found.kept), 'run')} kept" if found.kept else "")
+        f"{amount(outcome.executed, 'pass', 'passes')} to execute, {document['passes_one_by_one']} one by one"
+        + (f"; {amount(len(outcome.kept), 'run')} kept" if outcome.kept else "")
     )
-    if found.groups:
-        rows = [(name, str(drawn), str(alone)) for name, (drawn, alone) in found.shared().items()]
+    if outcome.groups:
+        rows = [(name, str(drawn), str(alone)) for name, (drawn, alone) in outcome.shared().items()]
         emit(table(rows, ("pass", "executed", "one by one"), right=(1, 2)))
-    paths, group_of = [axis.path for axis in found.prepared.space.axes], found.group_of()
+    paths, group_of = [axis.path for axis in outcome.prepared.space.axes], outcome.group_of()
     values = [[run.settings[path] for path in paths] for run in runs]
     emit(table([(group_of.get(number, "kept"), *row) for number, row in enumerate(values)], ("group", *paths)))

@@ -41,14 +41,14 @@ _MOST_NAMES = 3
 class Turn:
     """One attempt to render: its result or error, the files that caused it, its time, and the files to watch now.
 
-    `made` is the number of `programs`, `textures` and `scenes` that were created.
+    `created` is the number of `programs`, `textures` and `scenes` that were created.
     """
 
     value: dict[str, Any] | None
     error: RendergraphError | None
     changed: tuple[Path, ...]
     ms: float
-    made: Mapping[str, int]
+    created: Mapping[str, int]
     files: Stamps
 
 
@@ -60,15 +60,15 @@ def turns(draw: Draw, gpu: Gpu) -> Iterator[Turn]:
     """
     seen: tuple[Path, ...] = ()
     while True:
-        start, before = time.perf_counter(), _made(gpu)
+        start, before = time.perf_counter(), _creation_counts(gpu)
         value, error = None, None
         with track_reads() as files:
             try:
                 value = draw(gpu)
             except RendergraphError as problem:
                 error = problem
-        made = {name: count - before[name] for name, count in _made(gpu).items()}
-        yield Turn(value, error, seen, (time.perf_counter() - start) * 1e3, made, files)
+        created = {name: count - before[name] for name, count in _creation_counts(gpu).items()}
+        yield Turn(value, error, seen, (time.perf_counter() - start) * 1e3, created, files)
         seen = tuple(wait(files))
 
 
@@ -78,11 +78,11 @@ def wait(files: Stamps) -> list[Path]:
     A file that has vanished is given a moment to return: many editors write by renaming.
     """
     while True:
-        found = modified(files)
-        if found:
-            _settle(found)
-            if found := modified(files):  # it may be back, just as it was
-                return found
+        changed = modified(files)
+        if changed:
+            _settle(changed)
+            if changed := modified(files):  # it may be back, just as it was
+                return changed
         time.sleep(INTERVAL)
 
 
@@ -97,7 +97,7 @@ def _settle(paths: list[Path]) -> None:
         before = now
 
 
-def _made(gpu: Gpu) -> dict[str, int]:
+def _creation_counts(gpu: Gpu) -> dict[str, int]:
     cache = gpu.cache
     return {"programs": cache.programs.compiled, "textures": gpu.device.textures_made, "scenes": cache.scenes_made}
 
@@ -120,7 +120,7 @@ def watch_and_render(draw: Draw, device: int | None, *, as_json: bool) -> None:
                 else:
                     say(_line(turn))
             if number == 0:
-                count = sum(found is not None for found in turn.files.values())
+                count = sum(stamp is not None for stamp in turn.files.values())
                 say(f"watching {count} files; Ctrl-C ends")
             if as_json:
                 emit_json(_document(turn), line=True)
@@ -143,7 +143,7 @@ def _attempt(draw: Draw, gpu: Gpu) -> dict[str, Any]:
 def _is_fixable(error: RendergraphError, turn: Turn) -> bool:
     """Return whether a file of the user's is involved: a misspelt name on the command line ends the program instead."""
     shipped = [folder(package) for package in _SHIPPED]
-    existing = [Path(name) for name, found in turn.files.items() if found is not None]
+    existing = [Path(name) for name, stamp in turn.files.items() if stamp is not None]
     own = (path for path in existing if path.is_file() and not any(path.is_relative_to(place) for place in shipped))
     return isinstance(error, InputError) and any(own)
 
@@ -158,7 +158,7 @@ def _report_error(error: RendergraphError, changed: tuple[Path, ...], before: tu
 
 
 def _line(turn: Turn) -> str:
-    rebuilt = [f"{count} {name if count != 1 else name[:-1]}" for name, count in turn.made.items() if count]
+    rebuilt = [f"{count} {name if count != 1 else name[:-1]}" for name, count in turn.created.items() if count]
     frame_ms = (turn.value or {})["frame_ms"]["median"]
     what = f"rebuilt {', '.join(rebuilt)}" if rebuilt else "nothing rebuilt"
     return f"{_names(turn.changed)}: rendered in {turn.ms:.0f} ms ({frame_ms:.1f} ms per frame), {what}"
@@ -171,7 +171,7 @@ def _names(paths: tuple[Path, ...]) -> str:
 
 
 def _document(turn: Turn) -> dict[str, Any]:
-    about = {"changed": [str(path) for path in turn.changed], "ms": turn.ms, "made": dict(turn.made)}
+    about = {"changed": [str(path) for path in turn.changed], "ms": turn.ms, "made": dict(turn.created)}
     if turn.error is not None:
         return about | {"error": error_document(turn.error.problems, turn.error.exit_code)}
     return about | (turn.value or {})

@@ -217,12 +217,12 @@ def compare_pictures(
     extensions = Catalog.discover(tuple(plugins)).extensions
     target, encoding = read_picture(against)
     output = "image" if encoding == "display" else "radiance"
-    told = Reference(str(against), "file" if reference else "variant", target, encoding, output)
+    reference_picture = Reference(str(against), "file" if reference else "variant", target, encoding, output)
     graphs = [_graph_of(load(path, plugins=plugins)) for path in paths]
     results = []
     for name, path, graph in zip(names, paths, graphs, strict=True):
-        pixels = target if path is against else _read_like(path, told)
-        figures, flip_map = measure_against(pixels, told, str(path), extensions.metrics())
+        pixels = target if path is against else _read_like(path, reference_picture)
+        figures, flip_map = measure_against(pixels, reference_picture, str(path), extensions.metrics())
         results.append(
             Result(
                 name=name,
@@ -237,7 +237,7 @@ def compare_pictures(
         )
     return Comparison(
         results=tuple(results),
-        reference=told if reference else Reference(names[0], "variant", target, encoding, output),
+        reference=reference_picture if reference else Reference(names[0], "variant", target, encoding, output),
         base=(names[0], graphs[0]) if graphs[0] else None,
         scene="",
         camera=None,

@@ -96,10 +96,10 @@ def _crossings(columns: Sequence[Sequence[Box]]) -> int:
             for other, here, there in box.ties
             if other.layer == box.layer + 1
         )
-        passed: list[tuple[int, float]] = []
+        open_ends: list[tuple[int, float]] = []
         for _, end in ends:
-            total += len(passed) - bisect_right(passed, end)
-            insort(passed, end)
+            total += len(open_ends) - bisect_right(open_ends, end)
+            insort(open_ends, end)
     return total
 
 

@@ -244,13 +244,13 @@ def _node_json(graph: Graph, card: Card) -> dict[str, Any]:
     outputs: dict[str, Any] = {}
     for socket in card.outputs:
         info = info_of(graph, card.id, socket.name)
-        found: dict[str, Any] = {"kind": socket.kind, "semantic": socket.semantic, "used": socket.used}
+        facts: dict[str, Any] = {"kind": socket.kind, "semantic": socket.semantic, "used": socket.used}
         if info is not None and info.desc is not None:
-            found |= texture_json(info.desc)
-            found |= {"bytes": info.desc.bytes, "view": info.view, "lights": list(info.lights)}
+            facts |= texture_json(info.desc)
+            facts |= {"bytes": info.desc.bytes, "view": info.view, "lights": list(info.lights)}
         elif info is not None and info.bytes:
-            found["bytes"] = info.bytes
-        outputs[socket.name] = found
+            facts["bytes"] = info.bytes
+        outputs[socket.name] = facts
     node = graph[card.id]
     return {
         "id": card.id,

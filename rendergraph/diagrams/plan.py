@@ -112,11 +112,11 @@ def plan_json(plan: ResourcePlan) -> dict[str, Any]:
 
 def _resource_json(plan: ResourcePlan, id: str) -> dict[str, Any]:
     resource, life = plan.resources[id], plan.lifetimes[id]
-    found: dict[str, Any] = {"id": id, "role": resource.role, "bytes": plan.bytes(id), "kind": "buffer"}
+    facts: dict[str, Any] = {"id": id, "role": resource.role, "bytes": plan.bytes(id), "kind": "buffer"}
     if isinstance(resource.desc, TextureDesc):
-        found |= {"kind": resource.desc.kind, **texture_json(resource.desc)}
-    found |= {"first": life.first, "last": life.last}
-    return found | {"physical": list(plan.placement[id]), "reason": plan.reasons[id]}
+        facts |= {"kind": resource.desc.kind, **texture_json(resource.desc)}
+    facts |= {"first": life.first, "last": life.last}
+    return facts | {"physical": list(plan.placement[id]), "reason": plan.reasons[id]}
 
 
 def _groups(plan: ResourcePlan, every_step: bool) -> list[list[int]]:

@@ -121,7 +121,7 @@ class Executor(AbstractContextManager["Executor"], ABC):
     workers: int
 
     def __init__(self) -> None:
-        self._lost: Counter[tuple[Task, bool]] = Counter()
+        self._losses: Counter[tuple[Task, bool]] = Counter()
 
     @abstractmethod
     def submit(self, task: Task) -> None:
@@ -148,8 +148,8 @@ class Executor(AbstractContextManager["Executor"], ABC):
 
     def retry(self, task: Task, worker: str, error: RendergraphError, *, inputs_lost: bool = False) -> Event:
         """Submit a task again whose worker was lost, unless that was too often; with a worker, inputs may be lost."""
-        self._lost[task, inputs_lost] += 1
-        if self._lost[task, inputs_lost] < (self.workers + 1 if inputs_lost else ATTEMPTS):
+        self._losses[task, inputs_lost] += 1
+        if self._losses[task, inputs_lost] < (self.workers + 1 if inputs_lost else ATTEMPTS):
             self.submit(task)
             return TaskRetried(task, worker, tuple(error.problems))
         return TaskFailed(task, worker, error, lost=True)

@@ -140,7 +140,7 @@ class WorkerProcess:
             self._stored |= values.keys()
             self.child.pipe.send(("run", task))
         except OSError:
-            raise self._lost(self.child.exit_reason()) from None
+            raise self._loss_error(self.child.exit_reason()) from None
 
     @property
     def seconds_left(self) -> float:
@@ -161,7 +161,7 @@ class WorkerProcess:
                 self.kill()
                 raise RenderError(Problem("RG640", f"worker '{self.name}' {text}; --timeout allows more")) from None
             except EOFError as error:
-                raise self._lost(str(error)) from None
+                raise self._loss_error(str(error)) from None
             self._heard = time.monotonic()
             if kind == "unable":
                 self.kill()
@@ -169,7 +169,7 @@ class WorkerProcess:
             if kind != "ready":
                 return kind, value
 
-    def _lost(self, reason: str) -> RenderError:
+    def _loss_error(self, reason: str) -> RenderError:
         self.kill()
         text = f"worker '{self.name}' ended ({reason}); a driver that crashes or too little memory can cause this"
         return RenderError(Problem("RG640", text))

@@ -59,8 +59,8 @@ def _input(name: str, port: Any) -> dict[str, Any]:
     if not hasattr(port, "use"):  # an InOut, which continues what is connected
         return _texture(name, port) | {"optional": port.optional, "continues": True}
     keys = ("kind", "optional", "many", "size", "wrap", "compare", "anisotropy", "samples", "use", "doc")
-    found = {"name": name, "semantic": port.semantic.name, "filter": _constant(port.filter)}
-    return found | {key: getattr(port, key) for key in keys}
+    facts = {"name": name, "semantic": port.semantic.name, "filter": _constant(port.filter)}
+    return facts | {key: getattr(port, key) for key in keys}
 
 
 def _output(name: str, port: Any) -> dict[str, Any]:
@@ -70,8 +70,8 @@ def _output(name: str, port: Any) -> dict[str, Any]:
         return {"name": name, "kind": "view", "semantic": "view", "doc": port.doc}
     if isinstance(port, Function):
         signature = port.signature
-        found = {"name": name, "kind": "function", "semantic": signature.name, "declaration": signature.declaration}
-        return found | {"needs": list(port.needs), "doc": port.doc}
+        facts = {"name": name, "kind": "function", "semantic": signature.name, "declaration": signature.declaration}
+        return facts | {"needs": list(port.needs), "doc": port.doc}
     if isinstance(port, InOut) and not port.optional:  # its texture is the connected one
         return _carried(name, port) | {"continues": True}
     return _texture(name, port)
@@ -83,24 +83,24 @@ def _carried(name: str, port: Any) -> dict[str, Any]:
 
 
 def _texture(name: str, port: Any) -> dict[str, Any]:
-    found = _carried(name, port)
+    facts = _carried(name, port)
     if port.kind == "buffer":
-        found["bytes"] = _constant(port.bytes)
+        facts["bytes"] = _constant(port.bytes)
     else:
         defaults = ("rgba16f", 1.0) if port.like is None else (None, None)
         for key, value, default in zip(("format", "size"), (port.format, port.size), defaults, strict=True):
             if (given := default if value is None else value) is not None:
-                found[key] = _size(given) if key == "size" else _constant(given)
+                facts[key] = _size(given) if key == "size" else _constant(given)
     for key in ("mips", "layers", "samples"):
         if getattr(port, key) not in (None, 1):
-            found[key] = _constant(getattr(port, key))
+            facts[key] = _constant(getattr(port, key))
     if port.clear is not None:
-        found["clear"] = _constant(list(port.clear) if isinstance(port.clear, tuple) else port.clear)
+        facts["clear"] = _constant(list(port.clear) if isinstance(port.clear, tuple) else port.clear)
     if getattr(port, "needs", ()):
-        found["needs"] = list(port.needs)
+        facts["needs"] = list(port.needs)
     if getattr(port, "kept", False):
-        found["kept"] = True
-    return found
+        facts["kept"] = True
+    return facts
 
 
 def _constant(value: Any) -> Any:
@@ -125,7 +125,7 @@ def _parameter(parameter: Parameter, extensions: Extensions) -> dict[str, Any]:
     open_name, default = parameter.open_name, parameter.default
     added = extensions.choices(open_name) if open_name else []
     annotation = parameter.closed(tuple(one.name for one in added))
-    found: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "name": parameter.name,
         "type": brief(annotation) + (" | …" if open_name else ""),  # plugins may add to it
         "default": list(default) if isinstance(default, tuple) else default,
@@ -134,15 +134,15 @@ def _parameter(parameter: Parameter, extensions: Extensions) -> dict[str, Any]:
         "doc": parameter.doc,
     }
     if get_origin(annotation) is Literal:
-        found["choices"] = list(get_args(annotation))
+        facts["choices"] = list(get_args(annotation))
     if open_name:
-        found["open"] = open_name
-        found["added"] = [
+        facts["open"] = open_name
+        facts["added"] = [
             {"name": one.name, "plugin": one.plugin, "doc": about(one.value), "needs": list(needs(one.value))}
             for one in added
         ]
     limits = {"min": parameter.limits.low, "max": parameter.limits.high}
-    return found | {name: limit for name, limit in limits.items() if limit is not None}
+    return facts | {name: limit for name, limit in limits.items() if limit is not None}
 
 
 # --- facts of a port in words ----------------------------------------------------------------------------------------

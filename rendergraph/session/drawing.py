@@ -128,15 +128,15 @@ class Drawing(Struct, eq=False, dict=True):
             },
             infos=infos,
             device=self.gpu.device.as_json(),
-            types={node: graph[node].type.name for node in self._drawn},
+            types={node: graph[node].type.name for node in self._rendering_nodes},
             memory=plan.memory.as_json(),
             culled=dict(plan.schedule.culled),
             metadata={**self._metadata, **frame_metadata(self.number, self.expanded.options.fps)},
             times=tuple(self.times),
-            warnings=(*dict.fromkeys(self.gpu.cache.image_warnings), *self._alone()),
+            warnings=(*dict.fromkeys(self.gpu.cache.image_warnings), *self._single_frame_warnings()),
         )
 
-    def _alone(self) -> Iterator[Problem]:
+    def _single_frame_warnings(self) -> Iterator[Problem]:
         """Yield a warning if a single frame is rendered of a pipeline that accumulates frames."""
         node = self.runner.jittering
         if node is not None and self.expanded.options.frames == range(1, 2):
@@ -145,7 +145,7 @@ class Drawing(Struct, eq=False, dict=True):
             yield Problem("RG620", text, Place(self.expanded.linked.graph.name), severity="warning")
 
     @cached_property
-    def _drawn(self) -> tuple[str, ...]:
+    def _rendering_nodes(self) -> tuple[str, ...]:
         """The nodes that render, or compute something for those that do, in order."""
         drawing = dict.fromkeys(step.node for step in self.executable.plan.schedule.steps)
         return (*(node for node in self.runner.updating if node not in drawing), *drawing)

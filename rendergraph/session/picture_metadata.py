@@ -34,13 +34,13 @@ def is_picture(name: str | Path) -> bool:
 def pipeline_metadata(linked: Linked) -> dict[str, str]:
     """Return the metadata of all pictures of a pipeline."""
     selection, path = linked.selection, linked.spec.path
-    found = {
+    fields = {
         "pipeline": linked.spec.to_yaml(origins=False),
         "folder": None if path is None or path in shipped_pipelines().values() else _inside(path.parent),
         "camera": selection.camera,
         "environment": None if selection.environment is None else shown_file(selection.environment.absolute()),
     }
-    return {f"rendergraph:{name}": text for name, text in found.items() if text is not None}
+    return {f"rendergraph:{name}": text for name, text in fields.items() if text is not None}
 
 
 def frame_metadata(frame: int, fps: float) -> dict[str, str]:
@@ -76,11 +76,11 @@ def metadata(path: Path) -> dict[str, str]:
     from rendergraph.images import read_metadata  # most pipelines are files
 
     record_read(path)
-    found = read_metadata(path)
-    if "pipeline" not in found:
+    fields = read_metadata(path)
+    if "pipeline" not in fields:
         text = "the picture has no pipeline in its metadata; EXR and PNG files written by rendergraph have one"
         raise InputError(Problem("RG510", text, Place(str(path))))
-    return found
+    return fields
 
 
 def read_picture_metadata(path: Path, limits: YamlLimits) -> PictureMetadata:
@@ -91,30 +91,30 @@ def read_picture_metadata(path: Path, limits: YamlLimits) -> PictureMetadata:
     """
     from rendergraph.read import read  # see above
 
-    found = metadata(path)
-    home = PurePosixPath(found.get("folder", ""))
+    fields = metadata(path)
+    home = PurePosixPath(fields.get("folder", ""))
     inside = not home.is_absolute() and ".." not in home.parts
     document = read(
-        Path(home if inside else "") / path.name, found["pipeline"], limits, name=str(path), keep_going=True
+        Path(home if inside else "") / path.name, fields["pipeline"], limits, name=str(path), keep_going=True
     )
     return PictureMetadata(
         document,
-        found.get("camera"),
-        Path(found["environment"]) if "environment" in found else None,
-        _frame(found),
-        _fps(found),
+        fields.get("camera"),
+        Path(fields["environment"]) if "environment" in fields else None,
+        _frame(fields),
+        _fps(fields),
     )
 
 
-def _frame(found: Mapping[str, str]) -> int:
-    text = found.get("frame", "")
+def _frame(fields: Mapping[str, str]) -> int:
+    text = fields.get("frame", "")
     number = int(text) if re.fullmatch(r"[0-9]{1,10}", text) else 1
     return number if 1 <= number < _MOST_FRAMES else 1
 
 
-def _fps(found: Mapping[str, str]) -> float:
+def _fps(fields: Mapping[str, str]) -> float:
     try:
-        number = float(found.get("fps", ""))
+        number = float(fields.get("fps", ""))
     except ValueError:
         return 30.0
     return number if math.isfinite(number) and number > 0 else 30.0

@@ -71,13 +71,13 @@ def _once(stage: Callable[[Pipeline], T]) -> Callable[[Pipeline], T]:
     """Cache the result of a stage with the pipeline."""
 
     @wraps(stage)
-    def kept(self: Pipeline) -> T:
+    def cached(self: Pipeline) -> T:
         if stage.__name__ not in self._done:
             self._done[stage.__name__] = stage(self)
         found: T = self._done[stage.__name__]
         return found
 
-    return kept
+    return cached
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,11 +193,11 @@ class Pipeline:
 
         expanded = (self if size is None else self.with_size(size)).expand(**options)
 
-        def drawn() -> Iterator[Frame]:
+        def rendered() -> Iterator[Frame]:
             with opened(session, device) as gpu:
                 yield from stages.draw(expanded, gpu)
 
-        return drawn()
+        return rendered()
 
     def _repr_html_(self) -> str:
         from rendergraph.diagrams import svg

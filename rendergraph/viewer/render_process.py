@@ -48,10 +48,10 @@ class RenderProcess:
                 response = child.receive(patience)
             except TimeoutError:
                 text = f"the render process did not answer within {patience:.0f} s and was terminated"
-                raise self._lost(f"{text}; undo the last change, or allow more by --timeout") from None
+                raise self._loss_error(f"{text}; undo the last change, or allow more by --timeout") from None
             except EOFError as error:
                 text = f"the render process ended ({error}); a driver that crashes or too little memory can cause this"
-                raise self._lost(text) from None
+                raise self._loss_error(text) from None
             if isinstance(response, BaseException):
                 self._end()
                 raise response
@@ -69,7 +69,7 @@ class RenderProcess:
             self._child = ChildProcess("rendergraph.viewer.render_process:main", {"device": self._device})
         return self._child
 
-    def _lost(self, text: str) -> RenderError:
+    def _loss_error(self, text: str) -> RenderError:
         self._end()
         return RenderError(Problem("RG630", text))
 
