@@ -259,12 +259,10 @@ class NodeCheck:
             count = int(_texels(differ, one[name]).sum())
             total = _texels(differ, one[name]).size
             if count and not any(problem.code == "RG454" for problem in self._problems):
-                text = f"{count} of {total} texels of '{name}' are not written; write them all, or declare `clear=`"
+                what, fix = "texels of '{}' are not written", "`clear=`"
                 if one[name].ndim == 1:
-                    text = (
-                        f"{count} of {total} bytes of '{name}' are not written, or are added to without being cleared"
-                    )
-                    text += "; write them all, or declare `clear=0`"
+                    what, fix = "bytes of '{}' are not written, or are added to without being cleared", "`clear=0`"
+                text = f"{count} of {total} {what.format(name)}; write them all, or declare {fix}"
                 self._report(Problem("RG454", text, self._declaration(name)))
             elif not count and one[name].dtype.kind == "f" and not np.isfinite(one[name]).all():
                 bad = int(_texels(~np.isfinite(one[name]), one[name]).sum())

@@ -18,13 +18,7 @@ if TYPE_CHECKING:
     from rendergraph.session import Pipeline
 
 
-def _numbers(text: str) -> tuple[int, ...]:
-    from rendergraph.compare.export.openjd import parse_numbers
-
-    return parse_numbers(text)
-
-
-RUNS = options.Parsed("N,A-B", _numbers)
+RUNS = options.Parsed("N,A-B", "rendergraph.compare.export.openjd:parse_numbers")
 
 
 @click.command("farm", no_args_is_help=True)

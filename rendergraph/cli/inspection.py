@@ -243,16 +243,13 @@ def schema(what: str, plugins: tuple[Path, ...], output: Path | None, as_json: b
         from rendergraph.compare.store import line_schema
 
         document = line_schema() if what == "results" else csv_schema()
+    elif what in ("scene", "sweep"):
+        from rendergraph.keys import as_markdown, file_schema
+
+        document = as_markdown(file_schema(reference.table_of(what)))
     else:
-        document = _of_pipelines(what, plugins) if what not in ("scene", "sweep") else _of_table(what)
+        document = _of_pipelines(what, plugins)
     options.put(json.dumps(document, indent=2, ensure_ascii=False), output, as_json=as_json)
-
-
-def _of_table(what: str) -> Schema:
-    from rendergraph.keys import as_markdown, file_schema
-
-    document: Schema = as_markdown(file_schema(reference.table_of(what)))
-    return document
 
 
 def _of_pipelines(what: str, plugins: tuple[Path, ...]) -> Schema:

@@ -41,17 +41,24 @@ class Target(Struct, frozen=True):
 
 
 class Parsed(click.ParamType):  # type: ignore[type-arg]  # generic in new versions of click only
-    """A value that a function reads from text; the function's ValueError is the message."""
+    """A value that a function reads from text; the function's ValueError is the message.
 
-    def __init__(self, name: str, parse: Callable[[str], Any]) -> None:
+    A function that is given as `module:function` is imported when there is a value.
+    """
+
+    def __init__(self, name: str, parse: Callable[[str], Any] | str) -> None:
         self.name = name
         self._parse = parse
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if not isinstance(value, str):  # a default, or converted before
             return value
+        parse = self._parse
+        if isinstance(parse, str):
+            module, _, function = parse.partition(":")
+            parse = getattr(importlib.import_module(module), function)
         try:
-            return self._parse(value)
+            return parse(value)
         except ValueError as error:
             self.fail(str(error), param, ctx)
 
@@ -139,12 +146,6 @@ def _positive(text: str) -> float:
     return number
 
 
-def _executor(text: str) -> str:
-    from rendergraph.farm.executors import check_executor_name
-
-    return check_executor_name(text)
-
-
 def _devices(text: str) -> tuple[int, ...]:
     if text and not re.fullmatch(r"[0-9]{1,4}(,[0-9]{1,4})*", text):
         raise ValueError(f"'{text}' is not NUMBER,NUMBER, as `doctor` numbers GL devices")
@@ -158,7 +159,7 @@ OUTPUT = Parsed("[NAME=]FILE", _output)
 TAP = Parsed("NODE.PORT=FILE", _tap)
 LIMIT = Parsed("NAME=N", _limit)
 POSITIVE = Parsed("NUMBER", _positive)
-EXECUTOR = Parsed("NAME", _executor)
+EXECUTOR = Parsed("NAME", "rendergraph.farm.executors:check_executor_name")
 DEVICES = Parsed("N,N", _devices)
 _PATH = NamedPath()
 

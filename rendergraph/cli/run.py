@@ -144,6 +144,7 @@ def _read(
 ) -> tuple[Expanded, list[Target]]:
     """Do everything that needs no GL device: return the expanded pipeline, and the output files by their names."""
     from rendergraph import images
+    from rendergraph.images.video import is_film
     from rendergraph.session import stages
     from rendergraph.session.outputs import every_port, figures
 
@@ -161,7 +162,13 @@ def _read(
             for number, port in enumerate(ports, start=1)
         )
     known = linked.graph.outputs
-    named = [t if t.name else replace(t, name=images.output_for(_as_picture(t.path), known)) for t in outputs]
+    pictures = [
+        t.path.with_suffix(".png") if is_film(t.path) else t.path for t in outputs
+    ]  # a film consists of pictures
+    named = [
+        t if t.name else replace(t, name=images.output_for(path, known))
+        for t, path in zip(outputs, pictures, strict=True)
+    ]
     wanted = tuple(dict.fromkeys((*_names(named), *figures(linked.graph))))
     expanded = stages.expand(linked, replace(modes, outputs=wanted, taps=_names(taps)))
     targets = [*named, *taps]
@@ -179,13 +186,6 @@ def _default(source: str, ending: str) -> Path:
         kind = ".exr" if source.lower().endswith(".exr") else ".png"
         return Path(f"{Path(source).stem}-again{ending.removesuffix('.png')}{kind}")
     return Path(f"{Path(source).stem}{ending}")
-
-
-def _as_picture(path: Path) -> Path:
-    """The file whose extension selects the output: a film consists of pictures."""
-    from rendergraph.images.video import is_film
-
-    return path.with_suffix(".png") if is_film(path) else path
 
 
 def _make_folder(folder: Path) -> None:

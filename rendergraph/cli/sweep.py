@@ -22,12 +22,6 @@ if TYPE_CHECKING:
     from rendergraph.session import Selection
 
 
-def _axis(text: str) -> Axis:
-    from rendergraph.compare.space import parse_axis
-
-    return parse_axis(text)
-
-
 def _group(text: str) -> tuple[str, ...]:
     paths = tuple(part.strip() for part in text.split(","))
     if len(paths) < 2 or "" in paths:
@@ -42,7 +36,7 @@ def _group(text: str) -> tuple[str, ...]:
     "--axis",
     "axes",
     multiple=True,
-    type=options.Parsed("PATH=V,V,…", _axis),
+    type=options.Parsed("PATH=V,V,…", "rendergraph.compare.space:parse_axis"),
     shell_complete=options.offered("settings"),
     help="Values of a path that -s takes: 8,16, or 8:64:8, log:0.1:10:5; 0.1:2 for --samples.",
 )

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from rendergraph.session.gpu import Gpu
     from rendergraph.session.progress import Progress
     from rendergraph.session.selection import Selection
-    from rendergraph.session.values import Linked, Planned
+    from rendergraph.session.values import Planned
 
 METRIC = "metric"
 """Name of the output that is added for a measured port."""
@@ -356,7 +356,3 @@ def compared_output(graphs: Sequence[Graph], encoding: Encoding | None, *, measu
     lacking = next(graph for graph in graphs if names[0] not in graph.outputs)
     text = f"pipeline '{lacking.name}' has no output '{names[0]}' to compare; available: {', '.join(lacking.outputs)}"
     raise InputError(Problem("RG522", text))
-
-
-def scene_name(linked: Linked) -> str:
-    return linked.spec.scene.stem if linked.spec.scene else linked.scene.name

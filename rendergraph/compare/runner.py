@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any, Literal
 
 from rendergraph.compare.batches import MOST_RUNS, group_similar
-from rendergraph.compare.prepare import Prepared, SweepOptions, scene_name
+from rendergraph.compare.prepare import Prepared, SweepOptions
 from rendergraph.compare.results import Comparison, Reference, Result, objective_values, pareto_front
 from rendergraph.compare.store import Failure, RunRecord, SweepFolder, find_record, restored_result
 from rendergraph.compare.tasks import (
@@ -75,7 +75,7 @@ class Runner:
             results=results,
             reference=self.reference,
             base=(base.name, base.planned.linked.graph),
-            scene=scene_name(linked),
+            scene=linked.spec.scene.stem if linked.spec.scene else linked.scene.name,
             camera=linked.selection.camera,
             size=linked.graph.size,
             frame=self.options.frame,

@@ -32,11 +32,6 @@ def eight_bit(pixels: Pixels, encoding: Encoding) -> npt.NDArray[np.uint8]:
     return viewable(pixels, {"display": "display_color", "linear": "radiance"}.get(encoding, "any"))
 
 
-def img(identity: str, source: str, alt: str) -> str:
-    own = f' id="{identity}"' if identity else ""
-    return f'<img{own} src="{source}" alt="{escape(alt)}">'
-
-
 def drawing(svg: str, label: str) -> str:
     """Return an SVG document in a shadow tree, which isolates its style sheet.
 

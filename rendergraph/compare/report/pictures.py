@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
-from rendergraph.compare.report.html import eight_bit, img, number, png
+from rendergraph.compare.report.html import eight_bit, number, png
 from rendergraph.compare.results import Comparison
 from rendergraph.images import heat_map, viewable
 
@@ -78,7 +78,8 @@ def sheet(comparison: Comparison, most: int) -> str:
 
 
 def _figure(identity: str, source: str, caption: str) -> str:
-    return f"<figure>{img(identity, source, caption)}<figcaption>{escape(caption)}</figcaption></figure>"
+    own, alt = f' id="{identity}"' if identity else "", escape(caption)
+    return f'<figure><img{own} src="{source}" alt="{alt}"><figcaption>{alt}</figcaption></figure>'
 
 
 def first_differences(comparison: Comparison) -> str:
