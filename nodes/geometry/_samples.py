@@ -1,4 +1,4 @@
-"""How many samples a texel what draws geometry has."""
+"""Sample counts of the nodes that draw geometry."""
 
 from __future__ import annotations
 
@@ -10,6 +10,6 @@ Samples = Literal[1, 2, 4, 8, 16]
 
 
 def own_samples(node: Any, _facts: Facts) -> int:
-    """The node's parameter."""
+    """Return the node's `samples`."""
     count: int = node.samples
     return count

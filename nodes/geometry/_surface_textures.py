@@ -1,7 +1,7 @@
-"""What a G-buffer holds of a surface: the one list of its textures, as they are drawn and as they are read.
+"""The textures of a G-buffer, as they are written and as they are read.
 
-The classes at both ends still name each texture, in one line: type checkers and editors see a port only where a class
-body assigns it. A test holds both against this list.
+The nodes that write and read them still assign each port in their class body, because type checkers and editors see
+only those. A test compares both with this list.
 """
 
 from __future__ import annotations
@@ -15,7 +15,9 @@ from rendergraph.api import Emissive, Facts, Input, Material, Normal, ObjectFact
 
 from ._samples import own_samples
 
-AlbedoRoot = Semantic("albedo_root", "Root of the linear base colour, 0 to 1: even steps of it are even to the eye.")
+AlbedoRoot = Semantic(
+    "albedo_root", "Square root of the linear base colour, 0 to 1, whose steps are about perceptually uniform."
+)
 
 
 @dataclass(frozen=True)
@@ -23,36 +25,38 @@ class SurfaceTexture:
     """One texture of a G-buffer.
 
     Attributes:
-        semantic: what it means.
-        compact: its format with the precision `compact`.
-        doc: what its channels hold, as they are written and as they are read.
-        otherwise: what a reader takes that is not given it; such an input is optional.
-        needs: the word of the shading models that look at it; all do where there is none.
-        unless: the words of those that do not.
-        where: which objects have anything to say there; where none of those that are opaque has, nobody looks at it.
+        semantic: the meaning of its texels.
+        compact: the format for the precision `compact`.
+        doc: the contents of its channels.
+        default: what readers use if it is not connected; such an input is optional.
+        needs: a word of `#pragma needs`; only shading models with it read the texture, all if it is empty.
+        unless: words of shading models that do not read it.
+        is_relevant: whether it matters for an object; if for no opaque object, it is not read.
     """
 
     semantic: Semantic
     compact: str
     doc: str
-    otherwise: str = ""
+    default: str = ""
     needs: str = ""
     unless: tuple[str, ...] = ("nothing",)
-    where: Callable[[ObjectFacts], bool] | None = None
+    is_relevant: Callable[[ObjectFacts], bool] | None = None
 
-    def drawn(self) -> Output:
-        """The port of a node that fills it."""
+    def output(self) -> Output:
+        """Return the port of a node that writes it."""
         return Output(self.semantic, format=self._format, clear=0.0, samples=own_samples, doc=self.doc)
 
-    def read(self) -> Input:
-        """The port of a node that lights what it holds."""
-        doc = f"{self.doc} Unconnected: {self.otherwise}." if self.otherwise else self.doc
-        return Input(self.semantic, group="gbuffer", optional=bool(self.otherwise), samples="any", doc=doc)
+    def input(self) -> Input:
+        """Return the port of a node that reads it."""
+        doc = f"{self.doc} Unconnected: {self.default}." if self.default else self.doc
+        return Input(self.semantic, group="gbuffer", optional=bool(self.default), samples="any", doc=doc)
 
-    def is_looked_at(self, needs: Collection[str], objects: Sequence[ObjectFacts]) -> bool:
-        """Whether a shading model with these needs looks at it, of these objects."""
-        looks = (not self.needs or self.needs in needs) and not any(word in needs for word in self.unless)
-        return looks and (self.where is None or any(self.where(one) for one in objects if not one.blended))
+    def is_needed(self, needs: Collection[str], objects: Sequence[ObjectFacts]) -> bool:
+        """Return whether a shading model with these needs reads it, for these objects."""
+        is_read = (not self.needs or self.needs in needs) and not any(word in needs for word in self.unless)
+        return is_read and (
+            self.is_relevant is None or any(self.is_relevant(one) for one in objects if not one.blended)
+        )
 
     def _format(self, node: Any, facts: Facts) -> str:
         return self.compact if node.precision == "compact" else "rgba32f"
@@ -60,35 +64,47 @@ class SurfaceTexture:
 
 SURFACE_TEXTURES: Mapping[str, SurfaceTexture] = {
     "albedo": SurfaceTexture(
-        AlbedoRoot, "rgb10_a2", "Root of the base colour; alpha is 1 where a surface is.", unless=()
+        AlbedoRoot, "rgb10_a2", "Square root of the base colour; alpha is 1 on surfaces.", unless=()
     ),
-    "normal": SurfaceTexture(Normal, "rgba16_snorm", "Unit normal for shading, world space; 0 where nothing is."),
+    "normal": SurfaceTexture(Normal, "rgba16_snorm", "Unit shading normal in world space; 0 on the background."),
     "material": SurfaceTexture(
-        Material, "rgba16", "Metallic, roughness, occlusion, and 1 for surfaces that lights reach, 0 for unlit ones."
+        Material, "rgba16", "Metallic, roughness, occlusion; alpha is 0 for unlit surfaces, else 1."
     ),
-    "emissive": SurfaceTexture(Emissive, "r11f_g11f_b10f", "Emitted radiance.", where=lambda one: one.emissive),
+    "emissive": SurfaceTexture(Emissive, "r11f_g11f_b10f", "Emitted radiance.", is_relevant=lambda one: one.emissive),
     "specular": SurfaceTexture(
         AnyTexel,
         "rgba8",
-        "Of what is not metal: root of the reflectance at normal incidence, and at grazing incidence in alpha.",
-        otherwise="4 %, and 1",
+        "Square root of f0 of the dielectric part; alpha is its f90.",
+        default="f0 of 0.04 and f90 of 1",
         unless=("nothing", "phong"),
-        where=lambda one: one.reflective,
+        is_relevant=lambda one: one.reflective,
     ),
     "grain": SurfaceTexture(
         AnyTexel,
         "rgba16_snorm",
-        "Of materials with a grain: its unit direction, world space, and its strength in alpha.",
-        otherwise="none",
+        "Unit tangent of anisotropic materials in world space; alpha is the strength of the anisotropy.",
+        default="none",
         needs="grain",
     ),
     "phong_diffuse": SurfaceTexture(
-        AnyTexel, "rgb10_a2", "Root of kd of the empirical models.", otherwise="derived", needs="phong"
+        AnyTexel,
+        "rgb10_a2",
+        "Square root of kd of the empirical models.",
+        default="derived from the other textures",
+        needs="phong",
     ),
     "phong_specular": SurfaceTexture(
-        AnyTexel, "rgb10_a2", "Root of ks of the empirical models.", otherwise="derived", needs="phong"
+        AnyTexel,
+        "rgb10_a2",
+        "Square root of ks of the empirical models.",
+        default="derived from the other textures",
+        needs="phong",
     ),
     "phong_ambient": SurfaceTexture(
-        AnyTexel, "rgb10_a2", "Root of ka of the empirical models.", otherwise="derived", needs="phong"
+        AnyTexel,
+        "rgb10_a2",
+        "Square root of ka of the empirical models.",
+        default="derived from the other textures",
+        needs="phong",
     ),
 }

@@ -1,4 +1,4 @@
-"""What a texel shows has moved: what draws geometry says how far."""
+"""Screen-space motion, written by the nodes that draw geometry."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from ._samples import own_samples
 
 Velocity = Semantic(
     "velocity",
-    "How far what is there has moved since the last frame, in widths and heights of the picture, unjittered.",
+    "Screen-space motion since the previous frame, in widths and heights of the picture, without jitter.",
 )
 
 
-def drawn_velocity() -> Output:
-    """The port of a node that draws it; readers know from the depth where nothing is."""
-    doc = "Movement since the last frame, of surfaces and camera, in widths and heights of the picture; 0 in the first."
+def velocity_output() -> Output:
+    """Return the port of a node that writes velocity; readers recognise the background by its depth."""
+    doc = "Motion since the previous frame, of surfaces and camera, in widths and heights of the picture; 0 in frame 1."
     return Output(Velocity, format="rg16f", clear=0.0, samples=own_samples, doc=doc)

@@ -1,28 +1,28 @@
-"""Depth before everything else."""
+"""Depth pre-pass."""
 
 from __future__ import annotations
 
 from rendergraph.api import Depth, Input, Node, Output, Port, Steps, View, structural
 
 from ._samples import Samples, own_samples
-from ._velocity import drawn_velocity
+from ._velocity import velocity_output
 
 
 class DepthPrepass(Node):
-    """Depth of the nearest opaque surface at every pixel.
+    """Render the depth of the nearest opaque surface at every pixel.
 
-    Lighting that takes it shades no hidden fragment; image-space techniques reconstruct positions from it.
+    Lighting nodes that take it shade no hidden fragments, and screen-space techniques reconstruct positions from it.
     """
 
-    view = Input(View, kind="view", optional=True, doc="What it is seen from; the pipeline's camera by default.")
-    depth = Output(Depth, format="depth32f", clear=0.0, samples=own_samples, doc="Window depth, 0 where nothing is.")
+    view = Input(View, kind="view", optional=True, doc="The view; the pipeline's camera by default.")
+    depth = Output(Depth, format="depth32f", clear=0.0, samples=own_samples, doc="Window depth, 0 on the background.")
 
-    velocity = drawn_velocity()
+    velocity = velocity_output()
 
-    samples: Samples = structural(default=1, doc="Samples a pixel, as many as the pass has that takes the depth.")
+    samples: Samples = structural(default=1, doc="Samples per pixel, as many as in the pass that uses the depth.")
 
     def record(self, steps: Steps) -> None:
-        """Positions alone; fragments only where a mask cuts them."""
+        """Record a pass of positions only, with fragment shaders only for alpha masks."""
         out: dict[str, Port] = {"depth": self.depth}
         if steps.used(self.velocity):
             out["velocity"] = self.velocity

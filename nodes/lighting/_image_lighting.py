@@ -1,4 +1,4 @@
-"""What the nodes share that light a G-buffer in image space."""
+"""Inputs and steps of the nodes that light a G-buffer in image space."""
 
 from __future__ import annotations
 
@@ -11,66 +11,70 @@ from ..geometry._surface_textures import SURFACE_TEXTURES
 from ._lighting import Color, SurfaceLighting, shows_environment
 
 
-def samples_stored(_node: Any, facts: Facts) -> int:
-    """The samples of the depth, and so of all that goes with it."""
+def gbuffer_samples(_node: Any, facts: Facts) -> int:
+    """Return the sample count of the depth, which the whole G-buffer shares."""
     depth = facts.input("depth").desc
     assert depth is not None
     return depth.samples
 
 
 class ImageLighting(SurfaceLighting):
-    """Base of the nodes that light a G-buffer: its textures as one group of inputs.
+    """Base of the deferred lighting nodes. The textures of the G-buffer are one group of inputs.
 
-    What the shading model has no use for is not read, and so not drawn. A G-buffer does not hold surfaces with alpha
-    blending: they are drawn as `forward_lighting` draws them, over the picture and tested against its depth. Of a
-    G-buffer with several samples a pixel each is lit, unless the node says otherwise, and the picture has as many.
+    Textures that the shading model does not need are not read, and so not drawn either. A G-buffer contains no
+    transparent surfaces: they are drawn over the picture as by `forward_lighting`, tested against its depth. With a
+    multisampled G-buffer each sample is lit, unless the node does otherwise, and the picture has as many samples.
     """
 
-    depth = Input(Depth, group="gbuffer", samples="any", doc="Window depth; positions come from it and its view.")
-    albedo = SURFACE_TEXTURES["albedo"].read()
-    normal = SURFACE_TEXTURES["normal"].read()
-    material = SURFACE_TEXTURES["material"].read()
-    emissive = SURFACE_TEXTURES["emissive"].read()
-    specular = SURFACE_TEXTURES["specular"].read()
-    grain = SURFACE_TEXTURES["grain"].read()
-    phong_diffuse = SURFACE_TEXTURES["phong_diffuse"].read()
-    phong_specular = SURFACE_TEXTURES["phong_specular"].read()
-    phong_ambient = SURFACE_TEXTURES["phong_ambient"].read()
+    depth = Input(
+        Depth, group="gbuffer", samples="any", doc="Window depth, from which positions are reconstructed with its view."
+    )
+    albedo = SURFACE_TEXTURES["albedo"].input()
+    normal = SURFACE_TEXTURES["normal"].input()
+    material = SURFACE_TEXTURES["material"].input()
+    emissive = SURFACE_TEXTURES["emissive"].input()
+    specular = SURFACE_TEXTURES["specular"].input()
+    grain = SURFACE_TEXTURES["grain"].input()
+    phong_diffuse = SURFACE_TEXTURES["phong_diffuse"].input()
+    phong_specular = SURFACE_TEXTURES["phong_specular"].input()
+    phong_ambient = SURFACE_TEXTURES["phong_ambient"].input()
 
-    background: Color = param(default=0.0, min=0, glsl="vec3", doc="Radiance where nothing is, a number or RGB.")
+    background: Color = param(default=0.0, min=0, glsl="vec3", doc="Radiance of the background, a number or RGB.")
 
-    def surface(self, steps: Steps) -> dict[str, Any]:
-        """What a shader that includes `gbuffer_surface.glsl` reads for this shading model."""
+    def gbuffer_reads(self, steps: Steps) -> dict[str, Any]:
+        """Return what `gbuffer_surface.glsl` reads for the node's shading model."""
         needs = set(steps.needs("shading"))
         if "grain_where_any" in needs and any(entry.grain and not entry.blended for entry in steps.facts.objects):
             needs.add("grain")
         objects = steps.facts.objects
-        wanted = {name for name, texture in SURFACE_TEXTURES.items() if texture.is_looked_at(needs, objects)}
+        wanted = {name for name, texture in SURFACE_TEXTURES.items() if texture.is_needed(needs, objects)}
         ports = [port for name, port in self.inputs().items() if name in wanted]
         return _connected(steps, [self.depth, *ports])
 
     def per_sample(self, steps: Steps) -> dict[str, int]:
-        """The macro of a step that lights each sample by itself, where there are several."""
+        """Return the macro of a step that lights each sample of a multisampled G-buffer."""
         return {"PER_SAMPLE": 1} if steps.desc(self.depth).samples > 1 else {}
 
-    def shadows(self, steps: Steps) -> dict[str, Any]:
-        """What `shadow()` is made of."""
+    def shadow_reads(self, steps: Steps) -> dict[str, Any]:
+        """Return what `shadow()` reads."""
         return _connected(steps, [self.lookup, self.visibility] if self.wants_lights(steps) else [])
 
-    def ambient_light(self, steps: Steps) -> dict[str, Any]:
-        """Light from all around, and what scales it."""
-        return self.around(steps) | _connected(steps, [self.occlusion] if self.terms in ("all", "ambient") else [])
+    def ambient_reads(self, steps: Steps) -> dict[str, Any]:
+        """Return what ambient lighting reads: the environment and the occlusion."""
+        return self.environment_reads(steps) | _connected(
+            steps, [self.occlusion] if self.terms in ("all", "ambient") else []
+        )
 
     def backdrop_defines(self, steps: Steps) -> dict[str, int]:
-        """Whether something is laid under the picture afterwards."""
+        """Return the macro of a step that leaves the background to a backdrop."""
         return {"BACKDROP": 1} if shows_environment(self, steps.facts) else {}
 
-    def blend_over(self, steps: Steps) -> None:
-        """The environment under the lit picture and surfaces with alpha blending over it, both seen as it is."""
-        self.lay_under(steps, view=self.depth)
+    def draw_backdrop_and_transparent(self, steps: Steps) -> None:
+        """Draw the environment behind the lit surfaces, then transparent surfaces over both, with the depth's view."""
+        self.draw_backdrop(steps, view=self.depth)
         if self.blended:
-            self.blend(
-                steps, self.pictures(steps), self.shadows_on_blended(steps), self.depth.tested(), view=self.depth
+            self.draw_transparent(
+                steps, self.color_targets(steps), self.transparent_shadows(steps), self.depth.tested(), view=self.depth
             )
 
 

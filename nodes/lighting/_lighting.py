@@ -1,7 +1,8 @@
-"""What every lighting node can be told."""
+"""Inputs, parameters and steps that all lighting nodes share."""
 
 from __future__ import annotations
 
+import warnings
 from typing import Any, Literal
 
 from rendergraph.api import (
@@ -32,76 +33,85 @@ from ..geometry._samples import Samples
 
 UNDER = Blend("one_minus_dst_alpha", "one")
 Color = float | tuple[float, float, float]
-DIFFUSE = "The same radiance without its specular part: what lights other surfaces."
+DIFFUSE = "The same radiance without the specular part, which lights other surfaces."
 
 
 class Lighting(Node):
-    """Base of the nodes that turn surfaces into radiance: the shading model, its terms, shadows to look up."""
+    """Base of the lighting nodes: the shading model and its terms, shadows and the environment."""
 
-    lookup = Input(ShadowLookup, kind="function", many=True, optional=True, doc="Shadows to look up in place.")
+    lookup = Input(
+        ShadowLookup, kind="function", many=True, optional=True, doc="Shadow functions, evaluated per fragment."
+    )
     environment = Input(
-        EnvironmentLight, kind="function", optional=True, doc="Light from all around, in place of `ambient`."
+        EnvironmentLight, kind="function", optional=True, doc="Light of the environment, which replaces `ambient`."
     )
     brdf_table = Internal(
         format="rg16",
         size=(64, 64),
         kept=True,
-        doc="How much of an even light is mirrored, over the root of N·V and roughness.",
+        doc="Split-sum BRDF factors of f0 and f90, over sqrt(N·V) and roughness.",
     )
 
     shading: Literal["unlit", "phong", "blinn_phong", "anisotropic", "pbr"] | str = define(
         default="pbr",
-        doc="How surfaces reflect: Cook-Torrance (`pbr`), with the formulas of a grain alone, or an empirical model.",
+        doc="Shading model: Cook-Torrance (`pbr`), always with its anisotropic formulas, or an empirical model.",
         choices="shading",
         needs=("nothing", "phong", "grain", "grain_where_any"),
     )
     smith: Literal["exact", "fast"] = define(
-        default="exact", doc="Masking of `pbr`: Smith's, or a fit without roots. What has a grain always has Smith's."
+        default="exact",
+        doc="Visibility term of `pbr`: Smith, or a fit without square roots. Anisotropic surfaces use Smith.",
     )
     terms: Literal["all", "ambient", "diffuse", "specular", "emissive"] = define(
-        default="all", doc="One term alone, to look at; the four sum to the whole."
+        default="all", doc="Show a single term; the four terms add up to `all`."
     )
     ambient: Color = param(
         default=0.03,
         min=0,
         glsl="vec3",
         unless="environment",
-        doc="Radiance from all sides, a number or RGB; an environment takes its place.",
+        doc="Constant ambient radiance, a number or RGB; an environment replaces it.",
     )
     environment_part: Literal["all", "diffuse", "specular", "table"] = define(
         default="all",
-        doc="One part of the environment's light alone, to look at: `table` has its two factors of f0 and f90.",
+        doc="Show a single part of the environment's light; `table` shows the BRDF factors of f0 and f90.",
     )
     multiple_scattering: bool = define(
-        default=True, doc="Light of the environment that leaves rough surfaces after more than one reflection."
+        default=True,
+        doc="Add environment light that is scattered several times between the microfacets of rough surfaces.",
     )
     specular_occlusion: bool = define(
-        default=True, doc="What hides the environment hides less of its mirror image on smooth surfaces."
+        default=True, doc="Occlude the specular environment light less than the diffuse one on smooth surfaces."
     )
 
     def wants_lights(self, steps: Steps) -> bool:
-        """Whether punctual lights show in the picture at all."""
+        """Return whether punctual lights contribute to the picture."""
         return "nothing" not in steps.needs("shading") and self.terms in ("all", "diffuse", "specular")
 
     def record(self, steps: Steps) -> None:
-        """The table of what surfaces mirror, where they mirror an environment."""
-        if "brdf_table" in self.around(steps):
+        """Record the BRDF table, if surfaces reflect an environment."""
+        if "brdf_table" in self.environment_reads(steps):
             steps.fullscreen("brdf_table.frag", out=self.brdf_table, defines={"TABLE_SAMPLES": 512}, label="table")
 
     def around(self, steps: Steps) -> dict[str, Any]:
-        """What a shader reads for light from all around: the environment, where one is connected and shows."""
+        """Return `environment_reads`, of which this is the old name."""
+        warnings.warn("`around` is now called `environment_reads`", DeprecationWarning, stacklevel=2)
+        return self.environment_reads(steps)
+
+    def environment_reads(self, steps: Steps) -> dict[str, Any]:
+        """Return what a shader reads for environment lighting; nothing if it would not contribute."""
         needs = steps.needs("shading")
         if not steps.connected(self.environment) or "nothing" in needs or self.terms not in ("all", "ambient"):
             return {}
-        # The empirical models take its diffuse part alone.
+        # The empirical models use only its diffuse part.
         table = {} if "phong" in needs else {"brdf_table": self.brdf_table.sampled("linear")}
         return {"environment": self.environment, **table}
 
-    def lights_of(self, steps: Steps, shadows: Port) -> dict[str, Any]:
-        """What a shader reads that lights surfaces while they are drawn: what is around, and shadows to look up."""
-        return self.around(steps) | ({"lookup": shadows} if self.wants_lights(steps) else {})
+    def lighting_reads(self, steps: Steps, shadows: Port) -> dict[str, Any]:
+        """Return what a shader reads that lights geometry while drawing it: the environment and shadow functions."""
+        return self.environment_reads(steps) | ({"lookup": shadows} if self.wants_lights(steps) else {})
 
-    def blend(
+    def draw_transparent(
         self,
         steps: Steps,
         out: dict[str, Port],
@@ -114,18 +124,18 @@ class Lighting(Node):
         geometry: str | None = None,
         in_place: bool | None = None,
     ) -> None:
-        """Light surfaces with alpha blending and lay them over the picture, far to near.
+        """Light transparent surfaces and blend them over the picture, back to front.
 
         Args:
-            steps: what records it.
-            out: the picture, and its depth where that is attached to be written by others.
-            shadows: an input of functions.
-            depth: what they are tested against, where `out` has none.
-            view: what carries the view they are seen with; the node's `view` input or the camera by default.
-            fragment, vertex, geometry, in_place: shaders, and whether these draw objects where they are.
+            steps: records the step.
+            out: the picture, and its depth if another step of the node writes that.
+            shadows: the input with shadow functions.
+            depth: depth to test against, if `out` has none.
+            view: a port that carries the view; by default the node's `view` input or the camera.
+            fragment, vertex, geometry, in_place: shaders, and whether they leave objects in place.
         """
-        reads: dict[str, Any] = self.lights_of(steps, shadows) | ({} if depth is None else {"depth": depth})
-        reads = reads or {"lookup": shadows}  # a step that names nothing would read everything
+        reads: dict[str, Any] = self.lighting_reads(steps, shadows) | ({} if depth is None else {"depth": depth})
+        reads = reads or {"lookup": shadows}  # a step without reads would read all inputs
         steps.geometry(
             fragment,
             vertex=vertex,
@@ -141,55 +151,56 @@ class Lighting(Node):
 
 
 class SurfaceLighting(Lighting):
-    """Base of the nodes that make a whole picture: opaque surfaces, then those with alpha blending.
+    """Base of the nodes that light a whole picture: opaque surfaces first, then transparent ones.
 
-    What is known of the opaque surface of a pixel alone, visibility and occlusion, says nothing of a surface before it.
+    Screen-space visibility and occlusion are known only for the opaque surface of each pixel, so they do not apply to
+    transparent surfaces in front of it.
     """
 
     visibility = Input(
-        Visibility, kind="texture2d_array", many=True, optional=True, doc="Shadows in screen space, one layer a light."
+        Visibility, kind="texture2d_array", many=True, optional=True, doc="Screen-space shadows, one layer per light."
     )
-    occlusion = Input(Occlusion, optional=True, doc="Scales the ambient light: 1 open, 0 closed.")
+    occlusion = Input(Occlusion, optional=True, doc="Scales the ambient light: 1 is open, 0 fully occluded.")
     blended_lookup = Input(
         ShadowLookup,
         kind="function",
         many=True,
         optional=True,
-        doc="Shadows on surfaces with alpha blending, where those on the others are not looked up.",
+        doc="Shadow functions for transparent surfaces, if opaque ones use `visibility`.",
     )
 
     backdrop: bool = structural(
-        default=True, doc="Show the environment where no surface is, unless there is a `background`."
+        default=True, doc="Show the environment behind all surfaces, unless a `background` is set."
     )
     backdrop_blur: float = param(
         default=0.0,
         min=0,
         max=1,
-        doc="How blurred the environment is that shows: as a surface of this roughness has it.",
+        doc="Blur of the backdrop: the roughness of a surface that would reflect it so.",
     )
     blended: bool = structural(
-        default=True, doc="Draw surfaces with alpha blending too; otherwise a `forward_transparent` may."
+        default=True, doc="Draw transparent surfaces, too; otherwise a `forward_transparent` can draw them."
     )
 
-    def pictures(self, steps: Steps) -> dict[str, Port]:
-        """What is lit, and without its specular part where somebody reads that."""
+    def color_targets(self, steps: Steps) -> dict[str, Port]:
+        """Return `radiance`, and `diffuse` if it is used."""
         ports = self.outputs()
         wanted = ("radiance", "diffuse") if steps.used(ports["diffuse"]) else ("radiance",)
         return {name: ports[name] for name in wanted}
 
-    def lay_under(self, steps: Steps, view: Port | None = None) -> None:
-        """Show the environment where the picture is not covered yet.
+    def draw_backdrop(self, steps: Steps, view: Port | None = None) -> None:
+        """Show the environment where no surface covers the picture.
 
         Args:
-            steps: what records it.
-            view: what carries the view it is seen with; the node's `view` input or the camera by default.
+            steps: records the step.
+            view: a port that carries the view; by default the node's `view` input or the camera.
         """
         if shows_environment(self, steps.facts):
             steps.draw(
                 "backdrop.frag",
                 vertex="<fullscreen.vert>",
                 vertices=3,
-                out=self.pictures(steps),
+                out=self.color_targets(steps),
                 view=view,
                 state=State(blend=UNDER, cull="none"),
                 environment=self.environment,
@@ -197,82 +208,84 @@ class SurfaceLighting(Lighting):
                 label="backdrop",
             )
 
-    def shadows_on_blended(self, steps: Steps) -> Port:
-        """The shadows of surfaces with alpha blending."""
+    def transparent_shadows(self, steps: Steps) -> Port:
+        """Return the input with the shadow functions for transparent surfaces."""
         return self.blended_lookup if steps.connected(self.blended_lookup) else self.lookup
 
 
 def shows_environment(node: SurfaceLighting, facts: Facts) -> bool:
-    """Whether the environment shows where nothing is: there is one, and no other background is asked for."""
+    """Return whether the environment is the background: one is connected, and no other background is set."""
     background = getattr(node, "background", 0.0)
     plain = any(background) if isinstance(background, tuple) else background
     return not plain and node.backdrop and facts.connected("environment") and node.terms in ("all", "ambient")
 
 
 def background_texel(node: GeometryLighting, facts: Facts) -> tuple[float, ...]:
-    """What a picture of radiance holds where nothing is: the node's background, covered by nothing."""
+    """Return the clear value of radiance: the node's background with a coverage of 0."""
     if shows_environment(node, facts):
         return 0.0, 0.0, 0.0, 0.0
     rgb = node.background if isinstance(node.background, tuple) else (node.background,) * 3
     return *rgb, 0.0
 
 
-def samples_drawn(node: GeometryLighting, facts: Facts) -> int:
-    """The samples of what is drawn and lit: the node's own, or those of the depth that it is tested against."""
+def rendered_samples(node: GeometryLighting, facts: Facts) -> int:
+    """Return the sample count of the picture: the node's own, or that of the depth that it tests against."""
     tested = facts.input("depth").desc if facts.connected("depth") and node.samples == 1 else None
     return node.samples if tested is None else tested.samples
 
 
 class GeometryLighting(SurfaceLighting):
-    """Base of the nodes that light while the geometry is drawn.
+    """Base of the forward lighting nodes, which light geometry while drawing it.
 
-    `record` draws what is opaque by `light_opaque`, as often as the technique takes, and ends with `blend_after`.
+    `record` draws opaque surfaces with `draw_opaque`, in as many passes as the technique takes, and ends with
+    `draw_backdrop_and_transparent`.
     """
 
-    view = Input(View, kind="view", optional=True, doc="What it is seen from; the pipeline's camera by default.")
-    depth = Input(Depth, use="depth_test", optional=True, doc="Depth of a pre-pass, tested and not written.")
+    view = Input(View, kind="view", optional=True, doc="The view; the pipeline's camera by default.")
+    depth = Input(Depth, use="depth_test", optional=True, doc="Depth of a pre-pass, tested but not written.")
     radiance = Output(
         Radiance,
         format="rgba16f",
         clear=background_texel,
-        samples=samples_drawn,
-        doc="Scene-linear radiance; alpha is coverage, 1 where an opaque surface is and 0 where nothing is.",
+        samples=rendered_samples,
+        doc="Scene-linear radiance; alpha is coverage: 1 on opaque surfaces, 0 on the background.",
     )
-    diffuse = Output(Radiance, format="rgba16f", clear=background_texel, samples=samples_drawn, doc=DIFFUSE)
+    diffuse = Output(Radiance, format="rgba16f", clear=background_texel, samples=rendered_samples, doc=DIFFUSE)
     surface_depth = Output(
         Depth,
         format="depth32f",
         clear=0.0,
-        samples=samples_drawn,
-        doc="Depth of the nearest opaque surface, where no pre-pass is connected.",
+        samples=rendered_samples,
+        doc="Depth of the nearest opaque surface, if no pre-pass is connected.",
     )
 
-    background: Color = structural(default=0.0, min=0, doc="Radiance where nothing is, a number or RGB.")
+    background: Color = structural(default=0.0, min=0, doc="Radiance of the background, a number or RGB.")
     samples: Samples = structural(
-        default=1, doc="Samples a pixel: edges of triangles smooth, light computed once a pixel. 1: those of `depth`."
+        default=1,
+        doc="Samples per pixel: smooth triangle edges, with lighting once per pixel. 1 takes those of `depth`.",
     )
 
     def targets(self, steps: Steps) -> dict[str, Port]:
-        """What is drawn to: the picture, and its depth where no pre-pass has that."""
+        """Return the render targets: the picture, and its depth if there is no pre-pass."""
         depth = {} if steps.connected(self.depth) else {"surface_depth": self.surface_depth}
-        return {**self.pictures(steps), **depth}
+        return {**self.color_targets(steps), **depth}
 
-    def light_opaque(self, steps: Steps, fragment: str, **options: Any) -> None:
-        """Draw opaque surfaces, lit with what is connected.
+    def draw_opaque(self, steps: Steps, fragment: str, **options: Any) -> None:
+        """Draw and light opaque surfaces.
 
         Args:
-            steps: what records it.
-            fragment: the shader of fragments.
-            options: what else `steps.geometry` takes, such as what it reads beside depth, shadows and occlusion.
+            steps: records the step.
+            fragment: the fragment shader.
+            options: further arguments of `steps.geometry`, such as reads beside depth, shadows and occlusion.
         """
         connected = [port for port in (self.depth, self.visibility, self.occlusion) if steps.connected(port)]
         reads: dict[str, Any] = {port.name: port for port in connected}
-        # `lookup` in any case: a step that names nothing would read everything.
+        # `lookup` in any case: a step without reads would read all inputs.
         steps.geometry(fragment, out=self.targets(steps), objects="opaque", lookup=self.lookup, **reads, **options)
 
-    def blend_after(self, steps: Steps, **shaders: Any) -> None:
-        """The environment behind the opaque surfaces that have been drawn, and those with alpha blending over both."""
-        self.lay_under(steps)
+    def draw_backdrop_and_transparent(self, steps: Steps, **shaders: Any) -> None:
+        """Draw the environment behind the opaque surfaces, then transparent surfaces over both."""
+        self.draw_backdrop(steps)
         if self.blended:
             depth = self.depth if steps.connected(self.depth) else None
-            self.blend(steps, self.targets(steps), self.shadows_on_blended(steps), depth, **shaders)
+            self.draw_transparent(steps, self.targets(steps), self.transparent_shadows(steps), depth, **shaders)

@@ -1,4 +1,4 @@
-"""Lighting of a multisampled G-buffer, every sample only where they differ."""
+"""Deferred lighting of a multisampled G-buffer, per sample only where samples differ."""
 
 from __future__ import annotations
 
@@ -8,121 +8,125 @@ from rendergraph.api import Any as AnyTexel
 from rendergraph.api import Blend, Depth, Facts, Internal, Output, State, Stencil, StencilFace, Steps, param
 
 from ..display._mip_means import fill_mips
-from ._image_lighting import ImageLighting, samples_stored
+from ._image_lighting import ImageLighting, gbuffer_samples
 from .deferred_lighting import DeferredLighting
 
 _EDGE = 1
-_TILE = 4  # texels along a side; what some rasterisers shade at once
-_LOOKED_AT = ("depth", "albedo", "normal", "material", "emissive", "specular")
+_TILE = 4  # texels along a side; the block size in which some rasterisers shade
+_COMPARED = ("depth", "albedo", "normal", "material", "emissive", "specular")
 
 
-def half_of_depth(_node: DeferredMultisampled, facts: Facts) -> tuple[int, int]:
-    """Half the picture's size, rounded down as levels of a mip chain are."""
+def half_size(_node: DeferredMultisampled, facts: Facts) -> tuple[int, int]:
+    """Return half the size of the depth, rounded down as in a mip chain."""
     depth = facts.input("depth").desc
     assert depth is not None
     return depth.mip_size(1)
 
 
-def bytes_of_tiles(_node: DeferredMultisampled, facts: Facts) -> int:
-    """Two draw commands of five words, and for each a word a tile."""
+def tile_bytes(_node: DeferredMultisampled, facts: Facts) -> int:
+    """Return the size of two draw commands of five words, and of a list of all tiles for each of them."""
     depth = facts.input("depth").desc
     assert depth is not None
     return 4 * 2 * (5 + -(-depth.width // _TILE) * -(-depth.height // _TILE))
 
 
 class DeferredMultisampled(DeferredLighting):
-    """Radiance of a multisampled G-buffer, each sample lit by itself at edges, one light for all of them elsewhere.
+    """Light a multisampled G-buffer per sample at edges, and once per pixel elsewhere.
 
-    A G-buffer cannot be averaged and then lit: the mean of two surfaces is none. To light every sample is right, and
-    costs as many times as there are samples, though in most pixels all of them lie on one triangle. So pixels whose
-    samples differ are marked in the stencil (Lauritzen 2010), by depth, normal and material: every pixel is lit once,
-    in the middle of what is alike, and those that are marked sample by sample. Edges of shadows within a surface do not
-    show in a G-buffer. For them shadows are looked up at two samples on either side of each pixel's middle, which take
-    turns from pixel to pixel: pixels between which and beside which they differ are marked, too, and the mean of both
-    lights the others. The picture is that of `deferred_lighting`, which lights every sample. With one sample a pixel it
-    is that node.
+    A G-buffer cannot be averaged before lighting, because the mean of two surfaces is not a surface. Lighting every
+    sample is correct, but multiplies the cost by the sample count, although in most pixels all samples lie on one
+    triangle. Therefore pixels whose samples differ in depth, normal or material are marked in the stencil (Lauritzen
+    2010). Every pixel is lit once, and marked pixels are lit per sample. Shadow edges within a surface do not show in
+    a G-buffer. To find them, visibility is looked up at two samples on opposite sides of each pixel's centre, which
+    alternate from pixel to pixel. Where the two differ, or those of a neighbour, the pixel is marked, too; elsewhere
+    their mean is used. The picture matches that of `deferred_lighting`, which lights every sample. With one sample per
+    pixel, this node is that one.
     """
 
-    edges = Output(AnyTexel, format="r8", doc="1 where the samples of a pixel are lit one by one, 0 elsewhere.")
-    edge_share = Output(AnyTexel, format="r32f", size=(1, 1), doc="The share of pixels with samples lit one by one.")
-    marks = Internal(Depth, format="depth24_stencil8", samples=samples_stored, clear=0.0)
-    shadow_difference = Internal(format="r8", samples=samples_stored)
-    tiles = Internal(kind="buffer", bytes=bytes_of_tiles)
-    means = Internal(format="r32f", size=half_of_depth, mips=0)
+    edges = Output(AnyTexel, format="r8", doc="1 in pixels that are lit per sample, else 0.")
+    edge_share = Output(AnyTexel, format="r32f", size=(1, 1), doc="Fraction of the pixels that are lit per sample.")
+    marks = Internal(Depth, format="depth24_stencil8", samples=gbuffer_samples, clear=0.0)
+    shadow_difference = Internal(format="r8", samples=gbuffer_samples)
+    tiles = Internal(kind="buffer", bytes=tile_bytes)
+    edge_mips = Internal(format="r32f", size=half_size, mips=0)
 
     normal_angle: float = param(
-        default=1.0, unit="°", min=0, max=180, doc="Between normals of samples; what differs more is an edge."
+        default=1.0, unit="°", min=0, max=180, doc="Largest angle between the normals of samples on one surface."
     )
     depth_angle: float = param(
-        default=15.0, unit="°", min=0, max=90, doc="Between the way from sample to sample and the surface."
+        default=15.0,
+        unit="°",
+        min=0,
+        max=90,
+        doc="Largest angle between the surface and the line from sample to sample.",
     )
     shadow_change: float = param(
         default=0.05,
         min=0,
         max=1,
-        doc="Share of the light that shadows take at one sample and not at another; more is an edge. 1 finds none.",
+        doc="Largest difference of visibility, weighted by light, that is not an edge; 1 finds no shadow edges.",
     )
 
     def record(self, steps: Steps) -> None:
-        """Edges and their marks in the stencil, light for pixels and for marked samples; then what is blended."""
+        """Record edge detection, stencil marks, lighting per pixel and per marked sample, then transparent surfaces."""
         if steps.desc(self.depth).samples == 1:
             steps.clear(self.edges)
             steps.clear(self.edge_share)
             super().record(steps)
             return
         ImageLighting.record(self, steps)
-        reads = {**self.surface(steps), **self.shadows(steps), **self.ambient_light(steps)}
-        looked_at = {name: reads[name] for name in _LOOKED_AT if name in reads}
-        steps.fullscreen("deferred_edges.frag", out={"edges": self.edges}, **looked_at, label="edges")
-        lit: dict[str, Any] = {}
+        reads = {**self.gbuffer_reads(steps), **self.shadow_reads(steps), **self.ambient_reads(steps)}
+        compared = {name: reads[name] for name in _COMPARED if name in reads}
+        steps.fullscreen("deferred_edges.frag", out={"edges": self.edges}, **compared, label="edges")
+        difference: dict[str, Any] = {}
         if steps.connected(self.lookup) and self.wants_lights(steps):
-            lit = {"shadow_difference": self.shadow_difference}
+            difference = {"shadow_difference": self.shadow_difference}
         steps.fullscreen(
             "deferred_lighting.frag",
-            out=self.pictures(steps) | lit,
+            out=self.color_targets(steps) | difference,
             defines={"SHADE_ONCE": 1},
             label="pixels",
             edges=self.edges,
             **reads,
         )
-        if lit:
+        if difference:
             steps.fullscreen(
                 "shadow_edges.frag",
                 out={"edges": self.edges},
                 state=State(blend=Blend("one", "one", op="max")),
                 label="shadow edges",
                 depth=self.depth,
-                **lit,
+                **difference,
             )
-        here = StencilFace(reference=_EDGE, depth_pass="replace")
-        marking = State(depth_test=False, depth_write=False, stencil=Stencil(here))
-        steps.fullscreen("edge_stencil.frag", out=self.marks, edges=self.edges, state=marking, label="marks")
+        face = StencilFace(reference=_EDGE, depth_pass="replace")
+        marking = State(depth_test=False, depth_write=False, stencil=Stencil(face))
+        steps.fullscreen("edge_stencil.frag", out=self.marks, edges=self.edges, state=marking, label="edge stencil")
         steps.clear(self.tiles)
         steps.compute(
             "edge_tiles.comp",
             over=tuple(-(-side // _TILE) for side in steps.desc(self.edges).size),
             out={"tiles": self.tiles},
-            defines={"TILE": _TILE, **({"HAS_SHADOW_DIFFERENCE": 1} if lit else {})},
-            label="marked tiles",
+            defines={"TILE": _TILE, **({"HAS_SHADOW_DIFFERENCE": 1} if difference else {})},
+            label="edge tiles",
             edges=self.edges,
-            **lit,
+            **difference,
         )
-        self.light_marked(steps, reads, first=0 if lit else 1)
-        self.blend_over(steps)
+        self._light_marked_samples(steps, reads, first=0 if difference else 1)
+        self.draw_backdrop_and_transparent(steps)
         if steps.used(self.edge_share):
-            steps.fullscreen("<downsample.frag>", source=self.edges, out=self.means.mip(0))
-            last = fill_mips(steps, self.means)
-            steps.fullscreen("<downsample.frag>", source=self.means.mip(last), out=self.edge_share)
+            steps.fullscreen("<downsample.frag>", source=self.edges, out=self.edge_mips.mip(0))
+            last = fill_mips(steps, self.edge_mips)
+            steps.fullscreen("<downsample.frag>", source=self.edge_mips.mip(last), out=self.edge_share)
 
-    def light_marked(self, steps: Steps, reads: dict[str, Any], first: int) -> None:
-        """Light samples of marked pixels, in tiles: some rasterisers ask the stencil after the shader has run.
+    def _light_marked_samples(self, steps: Steps, reads: dict[str, Any], first: int) -> None:
+        """Light the samples of marked pixels, drawing only tiles that contain any.
 
-        The first sample of what surfaces mark has been lit with all pixels. So it is drawn in tiles alone where a
-        shadow marks something, and nowhere where there are none. A tile is a point, as the two triangles of a square
-        would both shade the texels along its diagonal, if not all of them.
+        Some rasterisers test the stencil after shading, so a full-screen pass would shade every pixel. At surface
+        edges, sample 0 has been lit together with all pixels, so it is drawn only in tiles with shadow edges. Tiles
+        are points, because both triangles of a quad would shade the texels along its diagonal.
 
         Args:
-            steps: what records it.
+            steps: records the steps.
             reads: what lighting reads.
             first: the first sample that may have to be lit.
         """
@@ -134,7 +138,7 @@ class DeferredMultisampled(DeferredLighting):
                 vertices=self.tiles,
                 topology="points",
                 command=0 if number else 1,
-                out={**self.pictures(steps), "marks": self.marks},
+                out={**self.color_targets(steps), "marks": self.marks},
                 defines={"ONE_SAMPLE": 1, "TILE": _TILE},
                 state=State(depth_test=False, depth_write=False, cull="none", stencil=marked),
                 label=f"sample {number}",

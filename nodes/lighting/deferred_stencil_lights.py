@@ -1,4 +1,4 @@
-"""Lighting of a G-buffer, local lights only where they reach."""
+"""Deferred lighting with stencil light volumes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 from rendergraph.api import ADD, Depth, Internal, Output, Radiance, State, Stencil, StencilFace, Steps
 
-from ._image_lighting import ImageLighting, samples_stored
+from ._image_lighting import ImageLighting, gbuffer_samples
 from ._lighting import DIFFUSE
 
 _SEGMENTS, _RINGS = 12, 8
@@ -14,38 +14,39 @@ _VERTICES = _SEGMENTS * _RINGS * 6
 
 
 class DeferredStencilLights(ImageLighting):
-    """Radiance of a G-buffer's surfaces, each point and spot light computed only on the pixels within its volume.
+    """Light the surfaces of a G-buffer, evaluating each point and spot light only on the pixels within its volume.
 
-    The volume is a sphere around a point light and a sector of one around a spot light, as far as the light's range;
-    without a range, as far as the picture reaches. Its faces behind the surface count up and down in the stencil, so
-    that what is left marks the surface inside it, wherever the eye is (z-fail, Bilodeau and Songy 1999); then its back
-    faces are drawn where that is not zero, and wipe it for the next light. Directional and ambient light take one pass
-    over the whole picture. The cost is V + sum of F': `deferred_lighting` draws the same picture for V + L F.
+    The volume is a sphere around a point light or a spherical sector around a spot light, with the light's range as
+    radius, or without a range the extent of the view frustum. Its faces behind the surface increment and decrement
+    the stencil, so that a nonzero value marks surfaces inside the volume, wherever the eye is (z-fail, Bilodeau and
+    Songy 1999). Then its back faces are drawn where the stencil is not zero, which also resets it for the next light.
+    Directional and ambient light take one full-screen pass. The cost is V + ΣF', while `deferred_lighting` renders the
+    same picture for V + L F.
     """
 
     radiance = Output(
         Radiance,
         format="rgba32f",
-        samples=samples_stored,
-        doc="Scene-linear radiance, float32: half floats would lose a step with every light. Alpha is coverage.",
+        samples=gbuffer_samples,
+        doc="Scene-linear radiance; alpha is coverage. Float32, because half floats would be rounded after each light.",
     )
-    diffuse = Output(Radiance, format="rgba32f", samples=samples_stored, doc=DIFFUSE)
-    marks = Internal(Depth, format="depth32f_stencil8", samples=samples_stored, clear=0.0)
+    diffuse = Output(Radiance, format="rgba32f", samples=gbuffer_samples, doc=DIFFUSE)
+    marks = Internal(Depth, format="depth32f_stencil8", samples=gbuffer_samples, clear=0.0)
 
     def record(self, steps: Steps) -> None:
-        """A pass for all that has no volume, two draws a local light, and what is blended."""
+        """Record a pass for everything without a volume, two draws per local light, then transparent surfaces."""
         super().record(steps)
-        surface, shadows = self.surface(steps), self.shadows(steps)
-        reads = {**surface, **shadows, **self.ambient_light(steps)}
+        gbuffer, shadows = self.gbuffer_reads(steps), self.shadow_reads(steps)
+        reads = {**gbuffer, **shadows, **self.ambient_reads(steps)}
         defines = {"DIRECTIONALS_ONLY": 1, **self.per_sample(steps), **self.backdrop_defines(steps)}
-        steps.fullscreen("deferred_lighting.frag", out=self.pictures(steps), defines=defines, **reads)
+        steps.fullscreen("deferred_lighting.frag", out=self.color_targets(steps), defines=defines, **reads)
         local = [number for number, light in enumerate(steps.lights) if light.type != "directional"]
         if local and self.wants_lights(steps):
-            self._add_lights(steps, local, surface, shadows)
-        self.blend_over(steps)
+            self._add_lights(steps, local, gbuffer, shadows)
+        self.draw_backdrop_and_transparent(steps)
 
-    def _add_lights(self, steps: Steps, local: list[int], surface: dict[str, Any], shadows: dict[str, Any]) -> None:
-        # The stencil needs a depth of its own: a texture must not be attached and sampled at once.
+    def _add_lights(self, steps: Steps, local: list[int], gbuffer: dict[str, Any], shadows: dict[str, Any]) -> None:
+        # The stencil is in a copy of the depth, because a texture must not be attached and sampled at the same time.
         steps.fullscreen("<copy_depth.frag>", out=self.marks, depth=self.depth)
         marking = State(
             cull="none",
@@ -73,10 +74,10 @@ class DeferredStencilLights(ImageLighting):
                 "deferred_stencil_lights.frag",
                 vertex="light_volume.vert",
                 vertices=_VERTICES,
-                out={**self.pictures(steps), "marks": self.marks},
+                out={**self.color_targets(steps), "marks": self.marks},
                 state=lighting,
                 defines={**shape, **self.per_sample(steps)},
                 light=light,
-                **surface,
+                **gbuffer,
                 **shadows,
             )

@@ -1,4 +1,4 @@
-"""Surfaces with alpha blending, layer by layer from the eye on."""
+"""Order-independent transparency by depth peeling."""
 
 from __future__ import annotations
 
@@ -17,61 +17,63 @@ from rendergraph.api import (
     structural,
 )
 
-from ._image_lighting import samples_stored
+from ._image_lighting import gbuffer_samples
 from ._lighting import UNDER, Lighting
 from .forward_transparent import ForwardTransparent
 
-_MOST_LAYERS = 8  # that `auto` takes
+_MAX_AUTO_LAYERS = 8
 
 
-def most_layers(facts: Facts) -> int:
-    """How many surfaces with alpha blending a line of sight can meet: a bound from shapes, wherever they stand."""
+def max_layers(facts: Facts) -> int:
+    """Return an upper bound of the transparent surfaces along a ray, from the shapes of all objects."""
     return sum(one.most_layers for one in facts.drawn("transparent"))
 
 
 class DepthPeeling(ForwardTransparent):
-    """Surfaces with alpha blending, lit and laid over a picture in the order of their depth at every single pixel.
+    """Light transparent surfaces and blend them over a picture, sorted by depth at every pixel.
 
-    A pass draws all of them and keeps the nearest at each pixel; the next one draws all again and keeps the nearest
-    behind that: layer by layer they are peeled off (Everitt 2001) and laid one under the other. Where surfaces cross,
-    each pixel has its own order, which no sorting of objects gives. As many layers as are asked for are exact, and what
-    lies behind them is not there. There are no more passes than the scene's surfaces can make layers, and after one
-    that has found nothing left the device leaves out the rest.
+    Each pass draws all transparent surfaces and keeps the nearest fragment behind the previous layer. The layers are
+    peeled off from front to back (Everitt 2001) and composited under each other. Intersecting surfaces are ordered per
+    pixel, which sorting objects cannot do. The number of layers asked for is exact; surfaces behind them are missing.
+    There are no more passes than the scene's surfaces can have layers, and once a pass draws nothing, the device skips
+    the remaining ones.
     """
 
-    depth = Input(Depth, samples="any", doc="Depth of the opaque surfaces, with their view; what is behind is hidden.")
+    depth = Input(
+        Depth, samples="any", doc="Depth of the opaque surfaces, which hide what is behind them, with its view."
+    )
     peeled = Output(
         Radiance,
         format="rgba32f",
         clear=0.0,
-        samples=samples_stored,
-        doc="The layers alone, premultiplied, alpha their opacity; float32, as half floats would lose a step a layer.",
+        samples=gbuffer_samples,
+        doc="The layers alone, premultiplied; alpha is opacity. Float32, as half floats would be rounded per layer.",
     )
-    layer = Internal(Radiance, format="rgba16f", samples=samples_stored, clear=0.0)
-    even = Internal(Depth, format="depth32f", samples=samples_stored, clear=0.0)
-    odd = Internal(Depth, format="depth32f", samples=samples_stored, clear=0.0)
+    layer = Internal(Radiance, format="rgba16f", samples=gbuffer_samples, clear=0.0)
+    even_depth = Internal(Depth, format="depth32f", samples=gbuffer_samples, clear=0.0)
+    odd_depth = Internal(Depth, format="depth32f", samples=gbuffer_samples, clear=0.0)
 
     layers: Literal["auto"] | int = structural(
         default="auto",
         min=1,
         max=64,
-        doc="Layers from the eye on, which are exact; what is behind them is left out. `auto`: as many as the scene's "
-        f"surfaces can make, at most {_MOST_LAYERS}.",
+        doc="Number of layers, from the nearest; surfaces behind them are missing. `auto`: as many as the scene's "
+        f"surfaces can have, at most {_MAX_AUTO_LAYERS}.",
     )
 
     def record(self, steps: Steps) -> None:
-        """A pass over the geometry for each layer, and one that lays it under those before; all over the picture."""
+        """Record a geometry pass per layer, composited under the previous ones, then blend all over the picture."""
         if not steps.draws("transparent"):
             if steps.used(self.peeled):
                 steps.clear(self.peeled)
-            self.blend(steps, {"radiance": self.radiance}, self.lookup)  # nothing, and says so
+            self.draw_transparent(steps, {"radiance": self.radiance}, self.lookup)  # records that nothing is drawn
             return
         Lighting.record(self, steps)
-        lit = self.lights_of(steps, self.lookup)
-        most = most_layers(steps.facts)
-        count = min(most, _MOST_LAYERS) if self.layers == "auto" else min(most, self.layers)
+        lit = self.lighting_reads(steps, self.lookup)
+        bound = max_layers(steps.facts)
+        count = min(bound, _MAX_AUTO_LAYERS) if self.layers == "auto" else min(bound, self.layers)
         for number in range(count):
-            nearest, previous = (self.odd, self.even) if number % 2 else (self.even, self.odd)
+            nearest, previous = (self.odd_depth, self.even_depth) if number % 2 else (self.even_depth, self.odd_depth)
             reads: dict[str, Any] = {"depth": self.depth, **lit, **({"previous_depth": previous} if number else {})}
             if number > 0:
                 steps.clear(self.layer)

@@ -1,4 +1,4 @@
-"""Light from the picture around the scene."""
+"""Image-based lighting."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from rendergraph.api import (
     structural,
 )
 
-_COARSE = 2  # bits of the side of the coarsest cells, as in the shader
-_MOST_CELLS = 256  # along a side of a face
-_HARMONICS_SIDE = 64  # of the faces that harmonics are projected from: those of 16 texels misplace a sun by 25 %
+_COARSEST = 2  # log2 of the side of the coarsest level of cells, as in the shader
+_MAX_CELLS = 256  # along a side of a face
+_HARMONICS_SIDE = 64  # texels of the faces that harmonics are projected from; with 16 a sun is off by 25 %
 
 
 def _cube_size(node: Any, facts: Facts) -> tuple[int, int]:
@@ -32,8 +32,8 @@ def _cube_size(node: Any, facts: Facts) -> tuple[int, int]:
 
 
 def _cells_side(node: Any) -> int:
-    """A power of two, so that four cells are one of the level below."""
-    return 1 << min(int(node.size), _MOST_CELLS).bit_length() - 1
+    """Return the number of cells along a side, a power of two, so that four cells form one of the next level."""
+    return 1 << min(int(node.size), _MAX_CELLS).bit_length() - 1
 
 
 def _cells_size(node: Any, facts: Facts) -> tuple[int, int]:
@@ -44,132 +44,141 @@ def _levels(node: Any) -> int:
     return min(int(node.mips), int(node.size).bit_length())
 
 
-def _sharp(node: Any) -> int:
-    """How many of the levels are halved from the whole size; those of wide lobes begin anew, larger."""
+def _sharp_levels(node: Any) -> int:
+    """Return the number of levels in `specular`; the wide lobes in `rough` restart at a larger size."""
     return _levels(node) // 2
 
 
 def _rough_size(node: Any, facts: Facts) -> tuple[int, int]:
-    side = int(node.size) >> max(1, _sharp(node) - 1)
+    side = int(node.size) >> max(1, _sharp_levels(node) - 1)
     return side, side
 
 
 class ImageBasedLight(Node):
-    """Light from all around, by the picture that is there.
+    """Light surfaces by an environment map (image-based lighting).
 
-    What a diffuse surface gathers are nine spherical harmonics (Ramamoorthi and Hanrahan 2001). What a rough one
-    mirrors is split into two factors (Karis 2013): the mean of the light around the mirrored direction, which is here,
-    a level of a cube map for each roughness; and how much of an even light the surface mirrors, a table of the node
-    that lights it. All of it is made once, when the scene is drawn first.
+    Diffuse light is represented by nine spherical harmonics (Ramamoorthi and Hanrahan 2001). Specular light uses the
+    split-sum approximation (Karis 2013): this node prefilters the environment with the GGX lobe, one level of a cube
+    map per roughness, and the lighting node has a table of the BRDF factors. All of it is computed once, when the scene
+    is first rendered.
     """
 
     map = Input(
-        EnvironmentMap, size="any", filter="trilinear", wrap="repeat", doc="The picture; unconnected, the scene's."
+        EnvironmentMap,
+        size="any",
+        filter="trilinear",
+        wrap="repeat",
+        doc="The environment map; the scene's by default.",
     )
     cells = Internal(
         kind="texture2d_array",
         format="rgba16f",
         layers=6,
         size=_cells_size,
-        mips=lambda node, facts: _cells_side(node).bit_length() - _COARSE,
+        mips=lambda node, facts: _cells_side(node).bit_length() - _COARSEST,
         kept=True,
-        doc="Mean radiance of the cells of a cube, level by level.",
+        doc="Mean radiance of the cells of a cube map, with all levels.",
     )
     light_directions = Internal(
         kind="texture2d_array",
         format="rgba32f",
         layers=6,
         size=_cells_size,
-        mips=lambda node, facts: _cells_side(node).bit_length() - _COARSE,
+        mips=lambda node, facts: _cells_side(node).bit_length() - _COARSEST,
         kept=True,
-        doc="Directions weighted by luminance: a cell's says where in it the light is, such as a sun, finer than half "
-        "floats do beside a narrow lobe.",
+        doc="Direction of the light of each cell, weighted by luminance, which locates a small light such as the sun; "
+        "float32, because half floats are too coarse for narrow lobes.",
     )
     cube = Internal(
-        kind="texture_cube", format="rgba16f", size=_cube_size, mips=0, kept=True, doc="What lobes are sampled in."
+        kind="texture_cube",
+        format="rgba16f",
+        size=_cube_size,
+        mips=0,
+        kept=True,
+        doc="The environment as a cube map, which lobes are sampled from.",
     )
     specular = Output(
         Radiance,
         kind="texture_cube",
         format="rgba16f",
         size=_cube_size,
-        mips=lambda node, facts: _sharp(node),
+        mips=lambda node, facts: _sharp_levels(node),
         kept=True,
-        doc="Mean radiance over GGX's lobe around each direction; roughness grows evenly from level to level, from 0.",
+        doc="Radiance averaged over the GGX lobe around each direction, with evenly increasing roughness per level.",
     )
     rough = Output(
         Radiance,
         kind="texture_cube",
         format="rgba16f",
         size=_rough_size,
-        mips=lambda node, facts: _levels(node) - _sharp(node),
+        mips=lambda node, facts: _levels(node) - _sharp_levels(node),
         kept=True,
-        doc="The levels of roughness that follow, to 1: with more texels than halving would leave them.",
+        doc="The following levels, up to roughness 1, with more texels than a mip chain would have.",
     )
     between = Output(
         Radiance,
         kind="texture_cube",
         format="rgba16f",
         size=lambda node, facts: (node.size // 2, node.size // 2),
-        mips=lambda node, facts: _sharp(node),
+        mips=lambda node, facts: _sharp_levels(node),
         kept=True,
-        doc="The same at the roughnesses halfway after each level of `specular`.",
+        doc="Levels halfway between those of `specular`.",
     )
     rough_between = Output(
         Radiance,
         kind="texture_cube",
         format="rgba16f",
         size=_rough_size,
-        mips=lambda node, facts: _levels(node) - _sharp(node) - 1,
+        mips=lambda node, facts: _levels(node) - _sharp_levels(node) - 1,
         kept=True,
-        doc="The same halfway between the levels of `rough`.",
+        doc="Levels halfway between those of `rough`.",
     )
     harmonics = Output(
         IrradianceSH,
         format="rgba32f",
         size=(16, 1),
         kept=True,
-        doc="The radiance's nine harmonics, a texel each, then seven of constants of a diffuse surface's light.",
+        doc="Nine spherical harmonics of the radiance, one per texel, then seven texels of irradiance coefficients.",
     )
     light: ClassVar[Function] = Function(
         EnvironmentLight,
         shader="environment_light.glsl",
         reads=("map", *(cube.sampled("trilinear") for cube in (specular, between, rough, rough_between)), "harmonics"),
-        doc="Light from around a direction.",
+        doc="Radiance from a direction, averaged over a lobe.",
     )
 
     size: int = structural(default=128, min=16, max=1024, unit="texels", doc="Side of the cube map's faces.")
     mips: int = structural(
-        default=6, min=3, max=12, doc="Levels of roughness from 0 to 1; as many less one lie between."
+        default=6, min=3, max=12, doc="Levels of roughness from 0 to 1, with one more halfway between each two."
     )
-    samples: int = define(default=64, min=8, max=1024, doc="Directions that a texel averages where lobes are sampled.")
+    samples: int = define(default=64, min=8, max=1024, doc="Samples per texel, for lobes that are sampled.")
     integrated_from: float = structural(
         default=0.05,
         min=0.05,
         max=2,
-        doc="Roughness from which on a lobe is integrated over all of the picture, and not sampled; 2 for none.",
+        doc="Roughness from which lobes are integrated over the whole environment instead of sampled; 2 samples all.",
     )
     level_bias: float = param(
         default=1.0,
         min=-2,
         max=4,
         unit="levels",
-        doc="How much coarser than its own share of the lobe each sample is read, against fireflies.",
+        doc="Bias of the mip level that samples read, against fireflies.",
     )
     window: bool = define(
         default=True,
-        doc="Damp the harmonics by as much as keeps what they give from falling below 0 behind a strong light.",
+        doc="Damp the harmonics just enough that the irradiance is not negative opposite of a strong light.",
     )
 
     def record(self, steps: Steps) -> None:
-        """Cells, harmonics of one level of theirs, and a dispatch for each roughness."""
+        """Record the cells, the harmonics of one of their levels, and a dispatch per roughness."""
         side = _cells_side(self)
-        pictures = {"cells": self.cells, "light_directions": self.light_directions}
+        levels = {"cells": self.cells, "light_directions": self.light_directions}
         steps.compute(
             "environment_cells.comp",
             over=(side, side, 6),
             map=self.map,
-            out={name: picture.mip(0) for name, picture in pictures.items()},
+            out={name: texture.mip(0) for name, texture in levels.items()},
             label="cells",
         )
         for level in range(1, steps.desc(self.cells).mips):
@@ -178,7 +187,7 @@ class ImageBasedLight(Node):
                 over=(side >> level, side >> level, 6),
                 cells=self.cells.mip(level - 1),
                 light_directions=self.light_directions.mip(level - 1),
-                out={f"coarse_{name}": picture.mip(level) for name, picture in pictures.items()},
+                out={f"coarse_{name}": texture.mip(level) for name, texture in levels.items()},
                 label=f"{side >> level} cells",
             )
         steps.compute(
@@ -194,19 +203,19 @@ class ImageBasedLight(Node):
             self._to_cube(steps, self.cube.mip(0), "cube")
             steps.mipmaps(self.cube)
         last = _levels(self) - 1
-        for cubes, after in (((self.specular, self.rough), 0.0), ((self.between, self.rough_between), 0.5)):
-            levels = [(cube, mip) for cube in cubes for mip in range(steps.desc(cube).mips)]
-            for level, (cube, mip) in enumerate(levels):
-                if level + after > 0:
-                    self._filter(steps, cube, mip, (level + after) / last)
+        for cubes, offset in (((self.specular, self.rough), 0.0), ((self.between, self.rough_between), 0.5)):
+            mips = [(cube, mip) for cube in cubes for mip in range(steps.desc(cube).mips)]
+            for level, (cube, mip) in enumerate(mips):
+                if level + offset > 0:
+                    self._filter(steps, cube, mip, (level + offset) / last)
 
     def _to_cube(self, steps: Steps, level: Part, label: str) -> None:
-        """The picture as the finest level of a cube map."""
+        """Record the conversion of the environment map to the finest level of a cube map."""
         out = {"cube": level}
         steps.compute("environment_cube.comp", over=(self.size, self.size, 6), map=self.map, out=out, label=label)
 
     def _filter(self, steps: Steps, cube: Output, mip: int, roughness: float) -> None:
-        """One level of a prefiltered cube map."""
+        """Record one level of a prefiltered cube map."""
         side = steps.desc(cube).mip_size(mip)[0]
         label, out = f"roughness {roughness:.2g}", {"specular": cube.mip(mip)}
         if roughness < self.integrated_from:
@@ -216,7 +225,7 @@ class ImageBasedLight(Node):
                 "environment_specular.comp", over=over, cube=source, roughness=roughness, out=out, label=label
             )
             return
-        over = (-(-side // 2), -(-side // 2), 6)  # four texels each
+        over = (-(-side // 2), -(-side // 2), 6)  # each invocation computes four texels
         steps.compute(
             "environment_integral.comp",
             over=over,

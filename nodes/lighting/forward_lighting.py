@@ -1,4 +1,4 @@
-"""Lighting while the geometry is drawn."""
+"""Forward lighting."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from ._lighting import GeometryLighting
 
 
 class ForwardLighting(GeometryLighting):
-    """Radiance of the scene under all its lights, in one pass over the geometry.
+    """Light the scene by all its lights, in one pass over the geometry.
 
-    Opaque surfaces first, front to back, then those with alpha blending, back to front. Shadows come as functions
-    looked up in place (`lookup`) or as pictures (`visibility`); all that are connected are multiplied. Pictures show
-    the opaque surfaces alone: those with alpha blending take functions only. With `depth` of a pre-pass no hidden
-    fragment is shaded.
+    Opaque surfaces are drawn first, front to back, then transparent ones, back to front. Shadows are functions that
+    are evaluated per fragment (`lookup`) or screen-space textures (`visibility`); all that are connected are
+    multiplied. Transparent surfaces use functions only, because the textures show the opaque surfaces. With the `depth`
+    of a pre-pass, no hidden fragment is shaded.
 
-    `evaluate` says how often light is computed: at every fragment (Phong 1975), at every vertex with colours
-    interpolated (Gouraud 1971), or once a face with the face's normal (flat). Textures and shadows stay per fragment.
+    `evaluate` sets how often lighting is computed: per fragment (Phong 1975), per vertex with interpolated colours
+    (Gouraud 1971), or once per face with its normal (flat shading). Textures and shadows are always per fragment.
     """
 
-    evaluate: Literal["fragment", "vertex", "face"] = define(default="fragment", doc="How often light is computed.")
+    evaluate: Literal["fragment", "vertex", "face"] = define(default="fragment", doc="How often lighting is computed.")
 
     def record(self, steps: Steps) -> None:
-        """One pass over what is opaque, one over what is blended."""
+        """Record a pass over opaque surfaces and one over transparent ones."""
         super().record(steps)
         shaders: dict[str, Any] = {
             "fragment": {"fragment": "forward_lighting.frag"},
@@ -35,7 +35,9 @@ class ForwardLighting(GeometryLighting):
                 "geometry": "forward_lighting.geom",
             },
         }[self.evaluate]
-        # Triangles that pass a geometry shader may come out a few steps of depth beside the pre-pass's.
-        nearer = (0.0, 8.0) if self.evaluate == "face" and steps.connected(self.depth) else None
-        self.light_opaque(steps, **shaders, **self.around(steps), in_place=True, state=State(polygon_offset=nearer))
-        self.blend_after(steps, **shaders, in_place=True)
+        # A geometry shader may change depths by a few steps compared with the pre-pass.
+        offset = (0.0, 8.0) if self.evaluate == "face" and steps.connected(self.depth) else None
+        self.draw_opaque(
+            steps, **shaders, **self.environment_reads(steps), in_place=True, state=State(polygon_offset=offset)
+        )
+        self.draw_backdrop_and_transparent(steps, **shaders, in_place=True)

@@ -1,34 +1,34 @@
-"""Lighting while the geometry is drawn, once a light."""
+"""Forward lighting in one pass per light."""
 
 from __future__ import annotations
 
 from rendergraph.api import ADD, Output, Radiance, State, Steps
 
-from ._lighting import DIFFUSE, GeometryLighting, background_texel, samples_drawn
+from ._lighting import DIFFUSE, GeometryLighting, background_texel, rendered_samples
 
 
 class ForwardMultipass(GeometryLighting):
-    """Radiance of the scene, drawn once for what needs no light and once more for each light, added up.
+    """Light the scene in a first pass without lights and one additive pass per light.
 
-    How many lights became possible before shaders could loop: every light costs all the geometry again and every
-    fragment that is seen, L (V + F). Passes after the first are drawn where depth is equal to what the first left.
-    Surfaces with alpha blending cannot be added up light by light; they come last, under all lights at once.
+    This was the way to many lights before shaders could loop. Every light costs the whole geometry and all visible
+    fragments again, L (V + F). Passes after the first use an equal depth test. Transparent surfaces cannot be added up
+    light by light, so they are drawn last, lit by all lights at once.
     """
 
     radiance = Output(
         Radiance,
         format="rgba32f",
         clear=background_texel,
-        samples=samples_drawn,
-        doc="Scene-linear radiance, float32: half floats would lose a step with every light. Alpha is coverage.",
+        samples=rendered_samples,
+        doc="Scene-linear radiance; alpha is coverage. Float32, because half floats would be rounded after each light.",
     )
-    diffuse = Output(Radiance, format="rgba32f", clear=background_texel, samples=samples_drawn, doc=DIFFUSE)
+    diffuse = Output(Radiance, format="rgba32f", clear=background_texel, samples=rendered_samples, doc=DIFFUSE)
 
     def record(self, steps: Steps) -> None:
-        """Ambient and emitted light first, then each light, then what is blended."""
+        """Record ambient light and emission, then each light, then transparent surfaces."""
         super().record(steps)
-        self.light_opaque(steps, "forward_multipass.frag", defines={"FIRST_PASS": 1}, **self.around(steps))
+        self.draw_opaque(steps, "forward_multipass.frag", defines={"FIRST_PASS": 1}, **self.environment_reads(steps))
         added = State(blend=ADD, depth_func="equal", depth_write=False)
         for light in range(len(steps.lights) if self.wants_lights(steps) else 0):
-            self.light_opaque(steps, "forward_multipass.frag", state=added, per_light=light, light=light)
-        self.blend_after(steps)
+            self.draw_opaque(steps, "forward_multipass.frag", state=added, per_light=light, light=light)
+        self.draw_backdrop_and_transparent(steps)

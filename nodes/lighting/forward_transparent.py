@@ -1,4 +1,4 @@
-"""Surfaces with alpha blending, over a picture of the opaque ones."""
+"""Transparent surfaces, blended over a picture of the opaque ones."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from ._lighting import Lighting
 
 
 class ForwardTransparent(Lighting):
-    """Surfaces with alpha blending, lit and laid over a picture, back to front.
+    """Light transparent surfaces and blend them over a picture, back to front.
 
-    What lights opaque surfaces does this too, in the same way and as its last step. As a node of its own it comes
-    after whatever else continues the radiance, a sky or light between surfaces: `blended: false` there leaves these
-    surfaces to it. They are ordered by their objects' centres, and seen as the depth was that hides them.
+    The lighting nodes do the same as their last step. As a separate node it can follow other passes that continue the
+    radiance, such as a sky or indirect light; `blended: false` makes the lighting node leave these surfaces to it.
+    Objects are sorted by their centres, and drawn with the view of the depth.
     """
 
-    depth = Input(Depth, use="depth_test", doc="Depth of the opaque surfaces, with their view; tested, not written.")
-    radiance = InOut(Radiance, doc="Scene-linear radiance; alpha is coverage, and colour is multiplied with it.")
+    depth = Input(Depth, use="depth_test", doc="Depth of the opaque surfaces, with its view; tested but not written.")
+    radiance = InOut(Radiance, doc="Scene-linear premultiplied radiance; alpha is coverage.")
 
     def record(self, steps: Steps) -> None:
-        """One step."""
+        """Record the pass over transparent surfaces."""
         if steps.draws("transparent"):
             super().record(steps)
-        self.blend(steps, {"radiance": self.radiance}, self.lookup, self.depth, view=self.depth)
+        self.draw_transparent(steps, {"radiance": self.radiance}, self.lookup, self.depth, view=self.depth)

@@ -1,4 +1,4 @@
-"""Views of cascaded shadow maps: how the picture's depth is shared out, and where each share's map lies."""
+"""Views of cascaded shadow maps: the split of the depth range, and the light's view of each cascade."""
 
 from __future__ import annotations
 
@@ -14,88 +14,88 @@ from rendergraph.api import ViewMatrices, projection
 
 Points = npt.NDArray[np.float64]
 
-_MARGIN = 9.0  # texels around a share: eight for filter kernels, one for what is lost by whole steps
-_STEP = 4  # a doubling of the distance takes so many steps
+_MARGIN = 9.0  # texels around a cascade: eight for filter kernels, one because views move by whole texels
+_STEPS_PER_DOUBLING = 4  # of the distance
 
 
 def split_distances(near: float, far: float, count: int, weight: float) -> list[float]:
-    """Where `count` parts of a depth range begin and end, `count + 1` distances.
+    """Return the `count + 1` split distances of a depth range.
 
-    Between the logarithmic split, which gives all parts texels of the same size on the screen, and the even one, which
-    leaves more to the far parts (Zhang, Sun, Xu and Lun, "Parallel-Split Shadow Maps for Large-Scale Virtual
-    Environments", 2006).
+    They interpolate between logarithmic splits, which give all cascades texels of equal size on the screen, and uniform
+    splits, which leave more texels to far cascades (Zhang, Sun, Xu and Lun, "Parallel-Split Shadow Maps for Large-Scale
+    Virtual Environments", 2006).
 
     Args:
         near, far: metres.
-        count: of parts.
-        weight: of the logarithmic split, 0 to 1.
+        count: number of cascades.
+        weight: weight of the logarithmic splits, 0 to 1.
     """
-    shares = [part / count for part in range(count + 1)]
-    return [weight * near * (far / near) ** share + (1 - weight) * (near + share * (far - near)) for share in shares]
+    fractions = [number / count for number in range(count + 1)]
+    return [weight * near * (far / near) ** s + (1 - weight) * (near + s * (far - near)) for s in fractions]
 
 
 def overlapping_spans(distances: Sequence[float], blend: float) -> list[tuple[float, float]]:
-    """Where each part is looked at: from a share `blend` of the part before; the last has no end."""
+    """Return the span of distances of each cascade, which begins in the last `blend` of the previous one."""
     begins = [0.0] + [b - blend * (b - a) for a, b in pairwise(distances[:-1])]
     return list(zip(begins, [*distances[1:-1], math.inf], strict=True))
 
 
-def farthest_seen(camera: ViewMatrices, box: Points) -> float:
-    """How far along its axis a camera sees anything of a box, in metres; rounded up to a few values.
+def farthest_visible(camera: ViewMatrices, box: Points) -> float:
+    """Return the largest distance along its axis at which a camera sees a box, in metres, rounded up to a few values.
 
-    Else every step of the camera would move all splits, and with them every texel of the maps.
+    Without rounding, every movement of the camera would change all splits, and with them every texel of the maps.
     """
     corners = projection.box_corners(box)
     farthest = float((-(corners @ camera.view[2, :3] + camera.view[2, 3])).max())
-    steps = math.ceil(_STEP * math.log2(max(farthest / camera.near, 2.0)) - 1e-9)
-    return float(min(camera.near * 2 ** (steps / _STEP), camera.far))
+    steps = math.ceil(_STEPS_PER_DOUBLING * math.log2(max(farthest / camera.near, 2.0)) - 1e-9)
+    return float(min(camera.near * 2 ** (steps / _STEPS_PER_DOUBLING), camera.far))
 
 
-def slice_sphere(camera: ViewMatrices, begin: float, end: float) -> tuple[Points, float]:
-    """Centre and radius of a ball around the part of a camera's frustum between two distances.
+def bounding_sphere(camera: ViewMatrices, begin: float, end: float) -> tuple[Points, float]:
+    """Return centre and radius of a sphere around the part of a camera's frustum between two distances.
 
-    The radius depends on the projection alone, to the last bit: it stays as it is when the camera moves and turns.
+    The radius depends only on the projection: it does not change in any bit when the camera moves or rotates.
     """
     corners = projection.frustum_corners(replace(camera, view=np.eye(4)), begin, end)
     first, last = corners[:4].mean(axis=0), corners[4:].mean(axis=0)
     axis = last - first
-    # Along the axis the nearest corners and the farthest ones are equally far from the best centre.
+    # The best centre on the axis has the same distance to the nearest and to the farthest corners.
     near_square, far_square = ((corners[part] - first) ** 2 for part in (slice(4), slice(4, 8)))
     gap = float(far_square.sum(axis=1).max() - near_square.sum(axis=1).max())
-    share = min(max(gap / (2 * float(axis @ axis)), 0.0), 1.0)
-    center = first + share * axis
+    fraction = min(max(gap / (2 * float(axis @ axis)), 0.0), 1.0)
+    center = first + fraction * axis
     radius = float(np.sqrt(((corners - center) ** 2).sum(axis=1).max()))
     return (projection.inverse_rigid(camera.view) @ np.append(center, 1.0))[:3], radius
 
 
 def cascade_view(
-    direction: Sequence[float], ball: tuple[Points, float], box: Points, casting: Points, resolution: int
+    direction: Sequence[float], sphere: tuple[Points, float], box: Points, casting: Points, resolution: int
 ) -> ViewMatrices:
-    """A directional light's view around a ball, whose texels stand still when the ball moves.
+    """Return a directional light's view around a sphere, whose texels do not move when the sphere moves.
 
-    Its size follows from the ball's alone, and it moves by whole texels. Where that is more than what casts spans, it
-    lies around that, and does not move at all.
+    Its size depends only on the sphere's radius, and it moves by whole texels. If the casters span less than that, the
+    view covers the casters, and does not move at all.
 
     Args:
-        direction: of the light.
-        ball: centre and radius of what is seen.
-        box: around the scene; all of it, along the light, is within the view.
-        casting: points around what casts, shape (n, 3).
+        direction: direction of the light.
+        sphere: centre and radius of the visible part.
+        box: the scene's bounds, which are within the view along the light's direction.
+        casting: points around the casters, shape (n, 3).
         resolution: texels along a side.
     """
     rotation = projection.view_along(direction)
-    center, radius = rotation[:2, :3] @ ball[0], ball[1]
+    center, radius = rotation[:2, :3] @ sphere[0], sphere[1]
     size = np.full(2, 2 * radius * projection.guard_band(resolution, _MARGIN))
     texel = size / resolution
     if len(casting):
-        across = casting @ rotation[:2, :3].T
-        low, high = across.min(axis=0), across.max(axis=0)
+        lateral = casting @ rotation[:2, :3].T
+        low, high = lateral.min(axis=0), lateral.max(axis=0)
         span = (high - low) * projection.guard_band(resolution, _MARGIN)
-        within = np.clip(center, np.minimum(low + radius, high), np.maximum(high - radius, low))
-        center = np.where(size < span, np.round(within / texel) * texel, (low + high) / 2)
+        clamped = np.clip(center, np.minimum(low + radius, high), np.maximum(high - radius, low))
+        center = np.where(size < span, np.round(clamped / texel) * texel, (low + high) / 2)
         size = np.minimum(size, span)
     else:
         center = np.round(center / texel) * texel
-    along = projection.box_corners(box) @ rotation[2, :3]
-    low_corner, high_corner = np.append(center - size / 2, along.min()), np.append(center + size / 2, along.max())
+    axial = projection.box_corners(box) @ rotation[2, :3]
+    low_corner, high_corner = np.append(center - size / 2, axial.min()), np.append(center + size / 2, axial.max())
     return projection.orthographic_view(rotation, low_corner, high_corner, resolution)

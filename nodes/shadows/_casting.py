@@ -1,4 +1,4 @@
-"""What the nodes share that choose the lights that cast."""
+"""Selection of the lights that cast shadows."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ from rendergraph.api import Facts, Node, Output, Visibility, structural
 
 
 class Casting(Node):
-    """Base of the nodes that make shadows of lights, by maps or without."""
+    """Base of the nodes that compute shadows of selected lights, with maps or without."""
 
     light: str | tuple[str, ...] = structural(
         default="auto",
-        doc="Lights that cast: names, or of those whose `casts_shadow` is left on `all`, or `auto`: the first "
-        "directional, else spot, else point light.",
+        doc="Lights that cast shadows: names, `all`, or `auto` for the first directional, else spot, else point light. "
+        "`all` and `auto` skip lights with `casts_shadow: false`.",
     )
 
     def lights(self, facts: Facts) -> tuple[int, ...]:
-        """The lights that cast, as the scene's indices."""
+        """Return the lights that cast shadows, as the scene's indices."""
         return facts.casting(self.light)
 
 
 def visibility_of_lights() -> Output:
-    """What those make that have no map: one layer for each of the node's `lights`, all lit at first."""
+    """Return the output of techniques without a map: one layer for each of the node's `lights`, cleared to lit."""
     return Output(
         Visibility,
         kind="texture2d_array",
@@ -28,5 +28,5 @@ def visibility_of_lights() -> Output:
         clear=1.0,
         layers=lambda node, facts: len(node.lights(facts)),
         lights=lambda node, facts: node.lights(facts),
-        doc="1 lit, 0 shadowed, one layer a light.",
+        doc="1 is lit, 0 in shadow; one layer per light.",
     )

@@ -1,4 +1,4 @@
-"""Silhouettes of meshes against lights, on the CPU: edges are found once a mesh, and looked at in every frame."""
+"""Silhouettes of meshes from lights, on the CPU. The edges of a mesh are found once and classified in every frame."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ import numpy.typing as npt
 
 Points = npt.NDArray[np.float64]
 
-_planes_of: WeakKeyDictionary[Any, Points] = WeakKeyDictionary()
+_plane_cache: WeakKeyDictionary[Any, Points] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
 class Silhouette:
-    """What a shadow volume of one object stands on, in world space.
+    """The silhouette edges and lit faces of one object in world space, from which its shadow volume is extruded.
 
     Attributes:
-        sides: (s, 2, 3), the ends of each edge between a face that the light meets and one that it does not: the
-            volume's side, as its outside sees it, has them, the first far away and the second far away in a Z.
-        lit: (t, 3, 3), the corners of the faces that the light meets, counter-clockwise from outside.
+        sides: ends of each edge between a lit and an unlit face, shape (s, 2, 3), ordered so that the quad (first, its
+            extrusion, second, its extrusion) as a strip faces outwards.
+        lit: corners of the faces that face the light, counter-clockwise from outside, shape (t, 3, 3).
     """
 
     sides: Points
@@ -29,12 +29,12 @@ class Silhouette:
 
 
 def silhouette(mesh: Any, transform: Points, light: Points) -> Silhouette:
-    """The silhouette of a closed mesh.
+    """Return the silhouette of a closed mesh.
 
     Args:
-        mesh: with `positions` and `edges`.
-        transform: object to world, (4, 4).
-        light: its place in the world, homogeneous: (x, y, z, 1), or (x, y, z, 0) towards it.
+        mesh: a mesh with `positions` and `edges`.
+        transform: object-to-world matrix, shape (4, 4).
+        light: homogeneous world-space position of the light, (x, y, z, 1), or (x, y, z, 0) towards it.
     """
     edges = mesh.edges
     facing = planes(mesh) @ (np.linalg.inv(transform) @ light) > 0
@@ -42,16 +42,16 @@ def silhouette(mesh: Any, transform: Points, light: Points) -> Silhouette:
     split = first != second
     ends = np.where(first[split, None], edges.ends[split, ::-1], edges.ends[split])
     lit = edges.triangles[facing]
-    if np.linalg.det(transform[:3, :3]) < 0:  # what runs one way round runs the other way in a mirror
+    if np.linalg.det(transform[:3, :3]) < 0:  # mirroring reverses the winding order
         ends, lit = ends[:, ::-1], lit[:, ::-1]
     points = mesh.positions.astype(np.float64) @ transform[:3, :3].T + transform[:3, 3]
     return Silhouette(points[ends], points[lit])
 
 
 def planes(mesh: Any) -> Points:
-    """The planes of a closed mesh's triangles, shape (t, 4): above 0 in front; found once."""
-    if mesh not in _planes_of:
+    """Return the planes of a closed mesh's triangles, shape (t, 4), positive in front; cached per mesh."""
+    if mesh not in _plane_cache:
         a, b, c = np.moveaxis(mesh.positions.astype(np.float64)[mesh.edges.triangles], 1, 0)
         normals = np.cross(b - a, c - a)
-        _planes_of[mesh] = np.column_stack([normals, -np.einsum("ij,ij->i", normals, a)])
-    return _planes_of[mesh]
+        _plane_cache[mesh] = np.column_stack([normals, -np.einsum("ij,ij->i", normals, a)])
+    return _plane_cache[mesh]

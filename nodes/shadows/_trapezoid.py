@@ -1,4 +1,4 @@
-"""The trapezoid around what is seen in a light's picture, and the projective map that makes it fill the picture."""
+"""The trapezoid around the visible part in a light's picture, and the projective transform that maps it to a square."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ Matrix = npt.NDArray[np.float64]
 Points = npt.NDArray[np.float64]
 
 FOCUS_SHARE = 0.8
-"""Of the map that goes to what is in focus."""
+"""Fraction of the map for the range in focus."""
 
-_SQUARE = np.array([[1.0, 0, 0, 1], [-1, 0, 0, 1], [0, 1, 0, 1], [0, -1, 0, 1]])  # planes around -1 to 1
+_SQUARE = np.array([[1.0, 0, 0, 1], [-1, 0, 0, 1], [0, 1, 0, 1], [0, -1, 0, 1]])  # planes of the square from -1 to 1
 
 
 def apex_distance(length: float, focus: float, share: float = FOCUS_SHARE) -> float:
-    """How far before a trapezoid its sides meet, so that the first `focus` of its `length` fills a share of the map.
+    """Return how far in front of a trapezoid its sides meet, so that the first `focus` of its `length` fills a share.
 
-    Infinite where it does so already, or its sides would have to part the other way (Martin and Tan, "Anti-aliasing and
-    Continuity with Trapezoidal Shadow Maps", 2004; their line at 80 % is -0.6 in a picture from 1 to -1).
+    It is infinite if a rectangle does so already, or if the sides would have to diverge (Martin and Tan, "Anti-aliasing
+    and Continuity with Trapezoidal Shadow Maps", 2004; their 80 % line is -0.6 in a picture from 1 to -1).
     """
     line = 1 - 2 * share
     rest = length - 2 * focus - length * line
@@ -30,7 +30,7 @@ def apex_distance(length: float, focus: float, share: float = FOCUS_SHARE) -> fl
 
 
 def trapezoid_to_square(trapezoid: Points) -> Matrix:
-    """The projective map of a trapezoid's corners to (-1, -1), (1, -1), (1, 1), (-1, 1), shape (3, 3).
+    """Return the projective transform of a trapezoid's corners to (-1, -1), (1, -1), (1, 1), (-1, 1), shape (3, 3).
 
     Args:
         trapezoid: (4, 2), the base first, counter-clockwise.
@@ -43,70 +43,69 @@ def trapezoid_to_square(trapezoid: Points) -> Matrix:
 
 
 def trapezoid_around(points: Points, start: Points, ahead: Points, focus: float) -> Points | None:
-    """A trapezoid around points of a picture, its sides at right angles to the line of sight, shape (4, 2).
+    """Return a trapezoid around points of a picture, with its bases perpendicular to the line of sight, shape (4, 2).
 
     Args:
-        points: (n, 2), what it holds.
-        start, ahead: (2,), where the line of sight begins, and its direction.
-        focus: share of its length, from the eye, that is in focus.
+        points: the points, shape (n, 2).
+        start, ahead: origin and direction of the line of sight, shape (2,).
+        focus: fraction of its length, from the eye, that is in focus.
 
     Returns:
-        The base, farthest from the eye, first, counter-clockwise; None where an upright rectangle does as well.
+        The corners, from the base farthest from the eye, counter-clockwise; None if a rectangle does as well.
     """
     ahead = ahead / np.linalg.norm(ahead)
-    side = np.array([ahead[1], -ahead[0]])  # to the right, looking ahead
-    along, across = (points - start) @ ahead, (points - start) @ side
-    near, far = float(along.min()), float(along.max())
+    side = np.array([ahead[1], -ahead[0]])  # to the right
+    axial, lateral = (points - start) @ ahead, (points - start) @ side
+    near, far = float(axial.min()), float(axial.max())
     apex = apex_distance(far - near, focus * (far - near))
     if not np.isfinite(apex):
         return None
-    middle = float(across.min() + across.max()) / 2
-    slopes = (across - middle) / (along - near + apex)
+    center = float(lateral.min() + lateral.max()) / 2
+    slopes = (lateral - center) / (axial - near + apex)
     low, high = float(slopes.min()), float(slopes.max())
-    widest, least = apex + far - near, apex
-    corners = [(far, high * widest), (far, low * widest), (near, low * least), (near, high * least)]
-    return np.array([start + a * ahead + (middle + s) * side for a, s in corners])
+    far_apex = apex + far - near
+    corners = [(far, high * far_apex), (far, low * far_apex), (near, low * apex), (near, high * apex)]
+    return np.array([start + a * ahead + (center + s) * side for a, s in corners])
 
 
-def warped(view: ViewMatrices, points: Points, camera: ViewMatrices, focus: float, margin: float) -> ViewMatrices:
-    """A light's view whose texels go where the camera looks closely.
+def warp_view(view: ViewMatrices, points: Points, camera: ViewMatrices, focus: float, margin: float) -> ViewMatrices:
+    """Return a light's view, warped so that it has more texels near the camera.
 
     Args:
-        view: of the light, that holds what is needed.
-        points: (n, 3), the corners of what the camera sees.
-        camera: what the picture is seen with.
-        focus: share of what is seen, from the eye on, that is in focus.
+        view: the light's view.
+        points: corners of the visible part of the scene, shape (n, 3).
+        camera: the camera's view.
+        focus: fraction of the visible range, from the eye, that is in focus.
         margin: texels around the trapezoid.
     """
     matrix = view.projection @ view.view
-    eye = np.linalg.inv(camera.view)
+    camera_to_world = np.linalg.inv(camera.view)
     if not len(points):
         return view
     farthest = float((-(points @ camera.view[2, :3] + camera.view[2, 3])).max())
-    line = np.array([eye @ (0, 0, -distance, 1) for distance in (camera.near, farthest)])
+    line = np.array([camera_to_world @ (0, 0, -distance, 1) for distance in (camera.near, farthest)])
     clip = np.concatenate([np.concatenate([points, np.ones((len(points), 1))], axis=1), line]) @ matrix.T
     if clip[:, 3].min() <= 1e-6 * np.abs(clip[:, 3]).max():
-        return view  # something of it is behind the light
-    flat = clip[:, :2] / clip[:, 3:]
-    start, end = flat[-2:]
+        return view  # a part of it is behind the light
+    ndc = clip[:, :2] / clip[:, 3:]
+    start, end = ndc[-2:]
     if np.linalg.norm(end - start) < 1e-4:
-        return view  # seen along the light
-    hull = projection.clip_polygon(np.pad(_hull(flat[:-2]), ((0, 0), (0, 1))), _SQUARE)[:, :2]
-    found = trapezoid_around(hull, start, end - start, focus) if len(hull) > 2 else None
-    if found is None:
+        return view  # the camera looks along the light's direction
+    hull = projection.clip_polygon(np.pad(_convex_hull(ndc[:-2]), ((0, 0), (0, 1))), _SQUARE)[:, :2]
+    trapezoid = trapezoid_around(hull, start, end - start, focus) if len(hull) > 2 else None
+    if trapezoid is None:
         return view
-    small = trapezoid_to_square(found)
-    small /= (
-        small[2] @ np.append(found, np.ones((4, 1)), axis=1).T
-    ).min()  # at least 1: nothing leaves the depth range
-    small[:2] /= projection.guard_band(view.size[0], margin)
-    warp = np.eye(4)
-    warp[np.ix_([0, 1, 3], [0, 1, 3])] = small
-    return replace(view, projection=warp @ view.projection)
+    warp = trapezoid_to_square(trapezoid)
+    # w is at least 1 on the trapezoid, so that nothing leaves the depth range.
+    warp /= (warp[2] @ np.append(trapezoid, np.ones((4, 1)), axis=1).T).min()
+    warp[:2] /= projection.guard_band(view.size[0], margin)
+    matrix = np.eye(4)
+    matrix[np.ix_([0, 1, 3], [0, 1, 3])] = warp
+    return replace(view, projection=matrix @ view.projection)
 
 
-def _hull(points: Points) -> Points:
-    """Corners of the convex hull of points in the plane, counter-clockwise (Andrew 1979)."""
+def _convex_hull(points: Points) -> Points:
+    """Return the corners of the convex hull of points in the plane, counter-clockwise (Andrew 1979)."""
     ordered = np.unique(points, axis=0)
     if len(ordered) < 3:
         return ordered

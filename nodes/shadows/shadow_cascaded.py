@@ -10,46 +10,48 @@ import numpy as np
 
 from rendergraph.api import Frame, ViewMatrices, param, structural
 
-from ._cascades import cascade_view, farthest_seen, overlapping_spans, slice_sphere, split_distances
+from ._cascades import bounding_sphere, cascade_view, farthest_visible, overlapping_spans, split_distances
 from ._light_views import casting_points
 from .shadow_map import ShadowMapNode
 
 
 class ShadowCascaded(ShadowMapNode):
-    """Depth seen from lights, in several maps a directional light: small ones near the eye, large ones far off.
+    """Render depth from lights with several cascades per directional light, small near the eye and large far away.
 
-    The distances that the camera sees are parted (Zhang, Sun, Xu and Lun 2006) and each part has a layer of its own, so
-    that texels near the eye are fine and those at the horizon suffice. Whatever filters a `shadow_map` filters this
-    one. Layers are chosen by a point's distance, and where parts meet they are blended. Texels stand still in the world
-    while the camera moves: a layer has the size of the ball around its part, however that is turned, and moves by whole
-    texels (Valient, "Stable Rendering of Cascaded Shadow Maps", 2008). Spot and point lights have what `shadow_map`
-    gives them.
+    The visible depth range is split (Zhang, Sun, Xu and Lun 2006), and each cascade has its own layer, so texels are
+    fine near the eye and just sufficient at the horizon. All techniques that take a `shadow_map` work with this one.
+    The layer is selected by the distance from the camera, and adjacent cascades are blended. Texels are stable in world
+    space while the camera moves: a layer has the size of the bounding sphere of its cascade, whatever the camera's
+    orientation, and moves by whole texels (Valient, "Stable Rendering of Cascaded Shadow Maps", 2008). Spot and point
+    lights have the same layers as in `shadow_map`.
     """
 
-    cascades: int = structural(default=4, min=1, max=8, doc="Parts of the distance, a layer each.")
+    cascades: int = structural(default=4, min=1, max=8, doc="Number of cascades, one layer each.")
     weight: float = param(
         default=0.9, min=0, max=1, doc="Splits of equal length (0), logarithmic splits (1), or a mix of both."
     )
-    blend: float = param(default=0.1, min=0, max=0.5, doc="Share of each part over which the next is blended in.")
+    blend: float = param(
+        default=0.1, min=0, max=0.5, doc="Fraction of each cascade over which it is blended with the next."
+    )
     reach: float = param(
-        default=0.0, unit="m", min=0, doc="How far from the eye parts go; 0 is as far as anything of the scene is seen."
+        default=0.0, unit="m", min=0, doc="Distance that the cascades reach from the eye; 0 reaches everything visible."
     )
 
     def layers(self, kind: str) -> int:
-        """How many layers a light of a kind has."""
+        """Return the number of layers of a kind of light."""
         return self.cascades if kind == "directional" else super().layers(kind)
 
     def light_views(self, light: Any, frame: Frame) -> Sequence[ViewMatrices]:
-        """One view a part of a directional light."""
+        """Return the views of one light: of a directional light one per cascade."""
         if light.type != "directional":
             return super().light_views(light, frame)
         camera, box = self.eye(frame), np.asarray(frame.scene.bounds, np.float64)
-        far = max(self.reach, 2 * camera.near) if self.reach else farthest_seen(camera, box)
+        far = max(self.reach, 2 * camera.near) if self.reach else farthest_visible(camera, box)
         distances = split_distances(camera.near, far, self.cascades, self.weight)
         spans = overlapping_spans(distances, self.blend)
         casting = casting_points(frame.scene, light.direction)
         views = []
         for span, end in zip(spans, distances[1:], strict=True):
-            ball = slice_sphere(camera, max(span[0], camera.near), end)
-            views.append(replace(cascade_view(light.direction, ball, box, casting, self.resolution), span=span))
+            sphere = bounding_sphere(camera, max(span[0], camera.near), end)
+            views.append(replace(cascade_view(light.direction, sphere, box, casting, self.resolution), span=span))
         return views

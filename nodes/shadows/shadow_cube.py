@@ -1,4 +1,4 @@
-"""Depth as lights see it on all sides, in one pass."""
+"""Shadow maps rendered in a single layered pass."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from .shadow_map import ShadowMapNode
 
 
 class ShadowCube(ShadowMapNode):
-    """Depth seen from lights, every layer in one pass over the geometry: made for point lights and their six.
+    """Render depth from lights into all layers in one pass, for point lights with their six layers.
 
-    A geometry shader sees each triangle from every view and sends it to the layers that it is not outside of, so that
-    the scene's vertices are fetched and placed once instead of six times. The map is `shadow_map`'s.
+    A geometry shader projects each triangle into every view and emits it to the layers that it may intersect, so
+    vertices are fetched and transformed once instead of six times. The map equals that of `shadow_map`.
     """
 
     def record(self, steps: Steps) -> None:
-        """One layered pass over what casts."""
+        """Record one layered pass over the casters."""
         if steps.desc(self.shadow_map).layers:
             steps.geometry(
                 "<depth.frag>",

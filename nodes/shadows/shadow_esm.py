@@ -10,19 +10,21 @@ from ._filtered_map import FilteredMap, filtered_lookup
 
 
 class ShadowESM(FilteredMap):
-    """Shadows from the mean of an exponential of depth (Annen, Mertens, Seidel, Flerackers and Kautz 2008).
+    """Approximate the depth test by an exponential of depth (Annen, Mertens, Seidel, Flerackers and Kautz 2008).
 
-    The step of the depth test is replaced by `exp(exponent · (z - t))`, at most 1, for something at depth z before a
-    receiver at t. It is a product of a part for each, so the map's part is filtered once a frame, in a single channel;
-    what is kept is its logarithm (Salvi 2008), so that neither range nor exponent is limited. Light leaks in close
-    behind a caster, up to about 3 / `exponent` metres, and where the filter sees something farther off than the
-    receiver the shadow's edge is eaten away, the more the larger the exponent.
+    The step of the depth test is replaced by `exp(exponent · (z - t))`, clamped to 1, for a caster at depth z in front
+    of a receiver at t. This is the product of a factor of the map and one of the receiver, so the map's factor can be
+    filtered once per frame, in a single channel. Its logarithm is stored (Salvi 2008), so that neither range nor
+    exponent is limited. Light leaks up to about 3 / `exponent` metres behind a caster. Where the filter region contains
+    surfaces farther away than the receiver, the shadow's edge recedes, the more the larger the exponent.
     """
 
-    down: ClassVar[str] = "shadow_esm_down.frag"
-    across: ClassVar[str] = "shadow_esm_across.frag"
-    texel: ClassVar[str] = "r32f"
+    vertical_shader: ClassVar[str] = "shadow_esm_vertical.frag"
+    horizontal_shader: ClassVar[str] = "shadow_esm_horizontal.frag"
+    texel_format: ClassVar[str] = "r32f"
 
     lookup = filtered_lookup("shadow_esm.glsl")
 
-    exponent: float = param(default=5.0, unit="1/m", min=0.01, max=10000, doc="How steep the step of the test is.")
+    exponent: float = param(
+        default=5.0, unit="1/m", min=0.01, max=10000, doc="Steepness of the approximated depth test."
+    )

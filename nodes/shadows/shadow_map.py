@@ -1,4 +1,4 @@
-"""Depth as lights see it."""
+"""Shadow maps: depth rendered from lights."""
 
 from __future__ import annotations
 
@@ -30,20 +30,21 @@ def _lights(node: ShadowMapNode, facts: Facts) -> tuple[int, ...]:
 
 
 class ShadowMapNode(Casting):
-    """Depth seen from lights: what every shadow-map technique starts from.
+    """Render depth from lights, the input of every shadow-map technique.
 
-    A directional light's layer is fitted to what the camera can see of the scene and to what casts, and reaches back
-    along the light to everything that may cast into the picture; a spot light's is fitted alike within its cone; a
-    point light has six layers, the faces of a cube. The layers stand in the scene's order of lights.
+    A directional light has one layer. It is fitted to the visible part of the scene and to the casters, and extends
+    towards the light to include everything that may cast a shadow into the picture. A spot light has one layer, fitted
+    in the same way within its cone. A point light has six layers, the faces of a cube. Layers are in the scene's order
+    of lights.
     """
 
     seen_from = Input(
         View,
         kind="view",
         optional=True,
-        doc="The view whose picture the shadows are for; the pipeline's camera by default.",
+        doc="View that the shadows are fitted to; the pipeline's camera by default.",
     )
-    views = Views(lights=_lights, doc="The lights' views, one a layer.")
+    views = Views(lights=_lights, doc="Views of the lights, one per layer.")
     shadow_map = Output(
         ShadowMap,
         kind="texture2d_array",
@@ -51,22 +52,26 @@ class ShadowMapNode(Casting):
         view="views",
         clear=0.0,
         size=lambda node, facts: (node.resolution, node.resolution),
-        doc="Window depth from each light, 0 where nothing is.",
+        doc="Window depth from each light, 0 on the background.",
     )
 
     resolution: int = structural(default=2048, unit="texels", min=1, max=16384, doc="Side of each layer.")
     slope_bias: float = structural(
-        default=0.0, unit="texels", min=0, max=64, doc="Polygon offset by slope; readers have an offset of their own."
+        default=0.0,
+        unit="texels",
+        min=0,
+        max=64,
+        doc="Slope-scaled polygon offset; the techniques have a separate offset.",
     )
 
     def record(self, steps: Steps) -> None:
-        """One pass a layer over what casts, from both sides: what has no back is in the light's way all the same.
+        """Record one pass per layer over the casters, without face culling, because open meshes cast shadows, too.
 
-        Of solid things the sun sees front faces alone; other lights may stand within them.
+        Back faces of closed meshes are culled for directional lights; other lights may lie inside a mesh.
         """
         offset = (-self.slope_bias, 0.0) if self.slope_bias else None
         for layer, light in enumerate(_lights(self, steps.facts)):
-            sun = steps.lights[light].type == "directional"
+            is_directional = steps.lights[light].type == "directional"
             steps.geometry(
                 "<depth.frag>",
                 vertex="<depth.vert>",
@@ -75,11 +80,11 @@ class ShadowMapNode(Casting):
                 view_index=layer,
                 objects="casters",
                 materials="alpha",
-                state=State(cull="solid" if sun else "none", polygon_offset=offset),
+                state=State(cull="solid" if is_directional else "none", polygon_offset=offset),
             )
 
     def update(self, frame: Frame) -> None:
-        """Fit the views to where the lights and the eye are now."""
+        """Fit the views to the current lights and camera."""
         lights = frame.scene.lights
         frame.set_views(
             self.views,
@@ -91,13 +96,13 @@ class ShadowMapNode(Casting):
         )
 
     def layers(self, kind: str) -> int:
-        """How many layers a light of a kind has."""
+        """Return the number of layers of a kind of light."""
         return 6 if kind == "point" else 1
 
     def light_views(self, light: Any, frame: Frame) -> Sequence[ViewMatrices]:
-        """The views of one light, as many as `layers` says."""
+        """Return the views of one light, one per layer."""
         return light_views(light, frame.scene, self.eye(frame), self.resolution)
 
     def eye(self, frame: Frame) -> ViewMatrices:
-        """The view that the shadows are for."""
+        """Return the view that the shadows are fitted to."""
         return next(iter(frame.views(self.seen_from)), frame.camera)

@@ -17,8 +17,8 @@ class ShadowMSM(FilteredMap):
     shadow themselves.
     """
 
-    down: ClassVar[str] = "shadow_msm_down.frag"
-    texel: ClassVar[str] = "rgba32f"
+    vertical_shader: ClassVar[str] = "shadow_msm_vertical.frag"
+    texel_format: ClassVar[str] = "rgba32f"
 
     lookup = filtered_lookup("shadow_msm.glsl")
 
@@ -26,11 +26,11 @@ class ShadowMSM(FilteredMap):
         default=1e-6,
         min=1e-7,
         max=0.1,
-        doc="How far the moments are moved towards those of a spread-out distribution, against rounding errors.",
+        doc="How far the moments are moved towards those of a uniform distribution, against rounding errors.",
     )
     light_bleeding: float = param(
         default=0.02,
         min=0,
         max=0.9,
-        doc="Visibility up to this becomes 0, what is above is stretched to reach 1 again.",
+        doc="Visibility up to this value becomes 0; the range above is rescaled to 0 to 1.",
     )

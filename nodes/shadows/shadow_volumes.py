@@ -5,30 +5,30 @@ from __future__ import annotations
 from rendergraph.api import Depth, Input, Internal, State, Steps
 
 from ._casting import visibility_of_lights
-from ._volumes import IN_SHADOW, CountsVolumes
+from ._volumes import INSIDE_VOLUMES, CountsVolumes
 
 
 class ShadowVolumes(CountsVolumes):
-    """Hard shadows that are exact at every pixel: what lies within a volume that a caster hides from the light.
+    """Compute hard shadows that are exact at every pixel, by shadow volumes.
 
-    No map, no resolution, no bias; the cost is that of filling the volumes, twice for each light. Casters are closed
-    meshes, and cast whole: an alpha mask cuts no holes.
+    There is no map, no resolution and no bias. The cost is the fill rate of the volumes, front and back faces for each
+    light. Casters must be closed meshes; alpha masks are ignored.
     """
 
-    depth = Input(Depth, doc="Depth of the opaque surfaces, seen by the pipeline's camera.")
+    depth = Input(Depth, doc="Depth of the opaque surfaces, from the pipeline's camera.")
     marks = Internal(Depth, format="depth32f_stencil8", clear=0.0)
     visibility = visibility_of_lights()
 
     def record(self, steps: Steps) -> None:
-        """Volumes and what lies in them, light by light; the stencil is wiped for the next on the way."""
-        # The depth may be read elsewhere meanwhile, and has no stencil.
+        """Record the volumes and the visibility of each light, which also clears the stencil for the next."""
+        # A copy, because other steps may read the depth, and it has no stencil.
         steps.fullscreen("<copy_depth.frag>", out=self.marks, depth=self.depth)
         for layer in range(len(self.lights(steps.facts))):
             self.count(steps, layer, self.marks, self.depth)
             steps.fullscreen(
                 "shadow_volumes.frag",
                 out={"visibility": self.visibility.layer(layer), "marks": self.marks},
-                state=State(depth_test=False, depth_write=False, stencil=IN_SHADOW),
+                state=State(depth_test=False, depth_write=False, stencil=INSIDE_VOLUMES),
                 region=layer,
                 depth=self.depth,
             )

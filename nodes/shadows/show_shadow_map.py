@@ -1,4 +1,4 @@
-"""A shadow map thrown back onto the scene, to look at."""
+"""Visualisation of a shadow map on the surfaces of the scene."""
 
 from __future__ import annotations
 
@@ -22,40 +22,40 @@ from rendergraph.api import (
 
 
 class ShowShadowMap(Node):
-    """A shadow map laid over a finished picture, where it lies in the scene: its texels, layers or depth.
+    """Show a shadow map over a finished picture, projected onto the scene: its texels, layers or depth.
 
-    Surfaces are tinted as lookups find them: by the layer that a point is looked up in, blended where two layers are.
-    What the light's map does not hold stays as it is. Texels are a chequered pattern, a square a texel: where squares
-    are larger than pixels, shadows have steps.
+    Surfaces are tinted by the layer that a lookup uses, blended where two layers overlap. Surfaces outside the light's
+    map are unchanged. Texels are a checkerboard; shadow edges have visible steps where its squares are larger than
+    pixels.
     """
 
-    shadow_map = Input(ShadowMap, kind="texture2d_array", size="any", doc="Depth as the lights see it.")
+    shadow_map = Input(ShadowMap, kind="texture2d_array", size="any", doc="Depth from the lights.")
     depth = Input(Depth, samples="any", doc="Depth of the picture.")
     color = InOut(DisplayColor, doc="The picture.")
 
-    light: str = structural(default="auto", doc="Whose map; `auto` is the first that the map holds.")
+    light: str = structural(default="auto", doc="Light whose map is shown; `auto` is the first of the map.")
     shown: Literal["texels", "layers", "both", "depth"] = define(
         default="both",
-        doc="Texels as squares, a colour for each layer, both, or the depth in the map, near ones dark.",
+        doc="Texels as squares, a colour per layer, both, or the depth in the map, with near depths dark.",
     )
-    opacity: float = param(default=0.4, min=0, max=1, doc="Of what is laid over.")
-    texels: int = param(default=8, min=1, max=1024, unit="texels", doc="Along a side of a square.")
+    opacity: float = param(default=0.4, min=0, max=1, doc="Opacity of the overlay.")
+    texels: int = param(default=8, min=1, max=1024, unit="texels", doc="Texels along a side of a square.")
 
     def record(self, steps: Steps) -> None:
-        """One step over the picture."""
-        held = steps.facts.input("shadow_map").lights
+        """Record one step over the picture."""
+        map_lights = steps.facts.input("shadow_map").lights
         if self.light == "auto":
-            wanted = held[:1]
+            shown = map_lights[:1]
         else:
-            wanted = tuple(index for index in steps.facts.casting(self.light) if index in held)
-            if not wanted:
+            shown = tuple(index for index in steps.facts.casting(self.light) if index in map_lights)
+            if not shown:
                 raise SceneError(f"light '{self.light}' has no shadow map here", self.light)
-        if wanted:
+        if shown:
             steps.fullscreen(
                 "show_shadow_map.frag",
                 out=self.color,
                 state=State(blend=ALPHA),
-                defines={"LIGHT": wanted[0]},
+                defines={"LIGHT": shown[0]},
                 shadow_map=self.shadow_map,
                 depth=self.depth,
                 bias=0.0,

@@ -1,4 +1,4 @@
-"""Shadow volumes to look at."""
+"""Visualisation of shadow volumes."""
 
 from __future__ import annotations
 
@@ -6,26 +6,26 @@ from typing import Literal
 
 from rendergraph.api import ALPHA, Depth, DisplayColor, InOut, Input, State, Steps, structural
 
-from ._volumes import AWAY, Z_FAIL, HasVolumes
+from ._volumes import DEPTH_OFFSET, Z_FAIL, HasVolumes
 
 
 class ShowVolumes(HasVolumes):
-    """Shadow volumes over a finished picture, translucent, and the silhouettes that they stand on as lines.
+    """Show shadow volumes over a finished picture as translucent faces, and silhouettes as lines.
 
-    Every face of a volume that is not hidden is laid over what is behind it: two for each volume that a ray passes.
+    All visible faces of a volume are blended: two for each volume that a ray passes through.
     """
 
-    depth = Input(Depth, use="depth_test", doc="Depth of the opaque surfaces, seen by the pipeline's camera.")
+    depth = Input(Depth, use="depth_test", doc="Depth of the opaque surfaces, from the pipeline's camera.")
     color = InOut(DisplayColor, doc="The picture.")
 
-    parts: Literal["all", "volumes", "silhouettes"] = structural(default="all", doc="What of them is drawn.")
+    parts: Literal["all", "volumes", "silhouettes"] = structural(default="all", doc="Parts to draw.")
     tint: tuple[float, float, float] = structural(
-        default=(1.0, 0.8, 0.2), min=0, max=1, doc="Colour of both, sRGB encoded."
+        default=(1.0, 0.8, 0.2), min=0, max=1, doc="Colour of volumes and silhouettes, sRGB encoded."
     )
-    opacity: float = structural(default=0.15, min=0, max=1, doc="Of each face of a volume.")
+    opacity: float = structural(default=0.15, min=0, max=1, doc="Opacity of each face of a volume.")
 
     def record(self, steps: Steps) -> None:
-        """Faces first, lines over them."""
+        """Record faces, then lines over them."""
         if not self.casters(steps.facts):
             return
         drawn = [("volumes", "shadow_volumes.geom", self.opacity), ("silhouettes", "silhouette_lines.geom", 1.0)]
@@ -33,7 +33,7 @@ class ShowVolumes(HasVolumes):
             depth_func="greater",
             depth_write=False,
             depth_clamp=True,
-            polygon_offset=(0.0, AWAY),
+            polygon_offset=(0.0, DEPTH_OFFSET),
             cull="none",
             blend=ALPHA,
         )
@@ -51,5 +51,5 @@ class ShowVolumes(HasVolumes):
                         view=self.depth,
                         state=state,
                         label=f"{part} of {steps.lights[light].name}",
-                        tinted=(*self.tint, opacity),
+                        face_color=(*self.tint, opacity),
                     )

@@ -1,7 +1,7 @@
-// What the techniques share that filter a map before anybody looks it up: where they find its views.
-uniform sampler2DArray covered;  // share of the filter where something is
+// Shared by the techniques that filter the shadow map before it is looked up: the filtered maps carry the views.
+uniform sampler2DArray coverage;  // fraction of the filter region that the map covers
 
-#define MAP_HALF_WIDTH 1.0  // the filter's width needs no offset: what is kept of a slope says how it is spread
-#define MAP_VIEWS covered_views
-#define MAP_LIGHTS covered_lights
-#define MAP_LAYERS COVERED_LAYERS
+#define MAP_HALF_WIDTH 1.0  // the offset need not grow with the filter's width: the filtered moments contain the slope
+#define MAP_VIEWS coverage_views
+#define MAP_LIGHTS coverage_lights
+#define MAP_LAYERS COVERAGE_LAYERS

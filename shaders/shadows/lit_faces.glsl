@@ -1,26 +1,24 @@
-// A caster's triangle with its three neighbours in world space, and which of them face the light.
-#include "extruded.glsl"
+// A caster's triangle with its three adjacent vertices in world space, and the test whether a triangle faces the light.
+#include "extrusion.glsl"
 
 layout(triangles_adjacency) in;
 in vec3 g_position[];
-flat in int g_way[];
+flat in int g_method[];
 flat in float g_handedness[];
 
-bool before(vec3 a, vec3 b) {
+bool is_before(vec3 a, vec3 b) {
     return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
 }
 
-// Whether a triangle faces the light. Each is asked about from four sides, and rounding must be the same from all of
-// them: it is computed from its least corner on.
-bool lit(vec3 a, vec3 b, vec3 c) {
-    vec3 first = before(b, a) && before(b, c) ? b : before(c, a) && before(c, b) ? c : a;
+// Whether a triangle faces the light. The result must be the same for the triangle itself and for its three neighbours
+// that test it, to the last bit: it is computed in a fixed order, from the lexicographically smallest corner.
+bool faces_light(vec3 a, vec3 b, vec3 c) {
+    vec3 first = is_before(b, a) && is_before(b, c) ? b : is_before(c, a) && is_before(c, b) ? c : a;
     vec3 second = first == a ? b : first == b ? c : a;
     vec3 third = first == a ? c : first == b ? a : b;
-    vec4 light = light_place();
-    precise vec3 along = second - first, up = third - first, to_light = light.xyz - first * light.w;
-    precise vec3 normal = vec3(
-        along.y * up.z - along.z * up.y, along.z * up.x - along.x * up.z, along.x * up.y - along.y * up.x
-    );
-    precise float side = normal.x * to_light.x + normal.y * to_light.y + normal.z * to_light.z;
+    vec4 light = light_position();
+    precise vec3 u = second - first, v = third - first, light_vector = light.xyz - first * light.w;
+    precise vec3 normal = vec3(u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x);
+    precise float side = normal.x * light_vector.x + normal.y * light_vector.y + normal.z * light_vector.z;
     return side * g_handedness[0] > 0.0;
 }

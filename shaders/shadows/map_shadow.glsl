@@ -1,17 +1,17 @@
-// The piece every shadow-map technique shares: which layer belongs to a light, where a point lies in it, and how far it
-// is moved so that a surface does not shadow itself. The technique's own include comes first and defines
+// Shared by all shadow-map techniques: which layer belongs to a light, the shadow-map coordinates of a point, and the
+// offset against self-shadowing. The technique's own include comes first and defines
 //
-//     float map_visibility(int layer, vec3 place)    // texture coordinates and depth in that layer, 0 to 1
-//     MAP_HALF_WIDTH                                 // half the width in texels of what it looks at
+//     float map_visibility(int layer, vec3 coords)    // texture coordinates and depth in that layer, 0 to 1
+//     MAP_HALF_WIDTH                                  // half the width of the filter kernel in texels
 //
-// With MAP_SLOPE it declares `vec2 map_slope` and `float map_texel` too: by how much the depth of the receiver's plane
-// changes a texel across and a texel up, and how many metres a texel is.
+// With MAP_SLOPE it also declares `vec2 map_slope`, the change of the depth of the receiver's plane per texel to the
+// right and per texel up, and `float map_texel`, the size of a texel in metres.
 //
-// The offset: `across` and `up` are steps in the world of one texel of the map at an unchanged depth, whatever the
-// projection. A plane in the world is one in the map, so what `across` has along its normal is how far the plane
-// departs from that depth in a texel. Moved by this much along the normal, and as much for `up` since the kernel is a
-// square, the point is above all of the plane that the kernel looks at. The offset vanishes where light falls straight
-// on. A face turned away from the light is moved away from it, and so lies behind what it belongs to.
+// The offset: `texel_x` and `texel_y` are world-space steps of one texel at constant depth, for any projection. A plane
+// in the world is a plane in the map, so `dot(texel_x, normal)` is how far the receiver's plane departs from constant
+// depth per texel. Moved along the normal by this distance for the x and the y axis of the square kernel, the point is
+// above the whole part of the plane that the kernel covers. The offset vanishes where light arrives perpendicularly. A
+// surface that faces away from the light is moved away from it, and so lies behind the front of its object.
 #ifndef MAP_VIEWS
 #define MAP_VIEWS shadow_map_views
 #define MAP_LIGHTS shadow_map_lights
@@ -19,52 +19,59 @@
 #endif
 
 uniform float bias;           // texels towards the light
-uniform float normal_offset;  // factor on what the slope asks for
+uniform float normal_offset;  // scale of the normal offset
 
-// The place of a moved point in one layer; false where the layer does not see it.
-bool place_in_layer(int layer, vec3 position, vec3 normal, out vec3 place) {
+// Shadow-map coordinates of an offset point in one layer; false if the layer's view does not contain it.
+bool shadow_map_coords(int layer, vec3 position, vec3 normal, out vec3 coords) {
     View view = MAP_VIEWS[layer];
-    vec4 clip = view.view_projection * vec4(position, 1.0);
-    vec2 texel = 2.0 * clip.w * view.viewport.zw;
-    mat4 back = view.inverse_view_projection;
-    vec3 across = (back[0].xyz - position * back[0].w) * texel.x;
-    vec3 up = (back[1].xyz - position * back[1].w) * texel.y;
-    float lean = abs(dot(across, normal)) + abs(dot(up, normal));
-    vec3 moved = normal * (normal_offset * MAP_HALF_WIDTH * lean);
-    moved += view_dir(view, position) * (bias * max(length(across), length(up)));
-    clip += view.view_projection * vec4(moved, 0.0);
-    place = clip.xyz / clip.w;
+    vec4 clip_position = view.view_projection * vec4(position, 1.0);
+    vec2 clip_texel = 2.0 * clip_position.w * view.viewport.zw;
+    mat4 clip_to_world = view.inverse_view_projection;
+    vec3 texel_x = (clip_to_world[0].xyz - position * clip_to_world[0].w) * clip_texel.x;
+    vec3 texel_y = (clip_to_world[1].xyz - position * clip_to_world[1].w) * clip_texel.y;
+    float slope = abs(dot(texel_x, normal)) + abs(dot(texel_y, normal));
+    vec3 offset = normal * (normal_offset * MAP_HALF_WIDTH * slope);
+    offset += view_dir(view, position) * (bias * max(length(texel_x), length(texel_y)));
+    clip_position += view.view_projection * vec4(offset, 0.0);
+    coords = clip_position.xyz / clip_position.w;
 #ifdef MAP_SLOPE
-    map_texel = max(length(across), length(up));
-    // The same plane in the map's own coordinates has the normal (across, up, deep) along these three.
-    vec3 deep = back[2].xyz - position * back[2].w;
-    float steep = max(abs(dot(deep, normal)), length(deep) / 20.0);  // on edge it has no end
-    map_slope = -vec2(dot(across, normal), dot(up, normal)) / (clip.w * (dot(deep, normal) < 0.0 ? -steep : steep));
+    map_texel = max(length(texel_x), length(texel_y));
+    // In the coordinate system of texel_x, texel_y and depth_axis, the same plane has these three dot products as
+    // normal.
+    vec3 depth_axis = clip_to_world[2].xyz - position * clip_to_world[2].w;
+    float NoD = dot(depth_axis, normal);
+    float magnitude = max(abs(NoD), length(depth_axis) / 20.0);  // limits the slope, which is infinite if edge-on
+    vec2 NoT = vec2(dot(texel_x, normal), dot(texel_y, normal));
+    map_slope = -NoT / (clip_position.w * (NoD < 0.0 ? -magnitude : magnitude));
 #endif
-    bool inside = clip.w > 0.0 && all(lessThanEqual(abs(place.xy), vec2(1.0))) && !nearer(place.z, 1.0);
-    place = vec3(place.xy * 0.5 + 0.5, max(place.z, 0.0));  // what lies beyond the far plane lies on it
-    return inside;
+    bool is_inside = clip_position.w > 0.0 && all(lessThanEqual(abs(coords.xy), vec2(1.0))) && !nearer(coords.z, 1.0);
+    coords = vec3(coords.xy * 0.5 + 0.5, max(coords.z, 0.0));  // points beyond the far plane are clamped to it
+    return is_inside;
 }
 
-// 1 where the light reaches the point. The first layer of the light decides that sees the point and has its distance
-// from the eye in its span; where the next one's span has begun, they are blended.
+// Visibility of a light from a point. The first layer is used that belongs to the light, contains the point, and has
+// the point's distance from the camera in its span. Where the span of the next layer overlaps, the two are blended.
 float shadow(int light, vec3 position, vec3 normal) {
-    vec3 place;
+    vec3 coords;
     float lit = 1.0;
-#if MAP_LAYERS == 1  // some compilers index by the counter even of a loop that has one turn
-    if (MAP_LIGHTS[0] == light && place_in_layer(0, position, normal, place)) lit = map_visibility(0, place);
+#if MAP_LAYERS == 1  // without a loop, because some compilers index dynamically even in a loop of a single iteration
+    if (MAP_LIGHTS[0] == light && shadow_map_coords(0, position, normal, coords)) {
+        lit = map_visibility(0, coords);
+    }
 #else
-    float far_off = -(camera.view * vec4(position, 1.0)).z;
-    float end = -1.0;
+    float view_distance = -(camera.view * vec4(position, 1.0)).z;
+    float span_end = -1.0;
     for (int layer = 0; layer < MAP_LAYERS; ++layer) {
         vec2 span = MAP_VIEWS[layer].range.zw;
-        if (MAP_LIGHTS[layer] != light || far_off < span.x || far_off >= span.y) continue;
-        if (!place_in_layer(layer, position, normal, place)) continue;
-        float one = map_visibility(layer, place);
-        if (end > 0.0) return mix(lit, one, (far_off - span.x) / (end - span.x));
-        lit = one;
-        end = span.y;
-        if (isinf(end)) break;
+        if (MAP_LIGHTS[layer] != light || view_distance < span.x || view_distance >= span.y) continue;
+        if (!shadow_map_coords(layer, position, normal, coords)) continue;
+        float layer_visibility = map_visibility(layer, coords);
+        if (span_end > 0.0) {
+            return mix(lit, layer_visibility, (view_distance - span.x) / (span_end - span.x));
+        }
+        lit = layer_visibility;
+        span_end = span.y;
+        if (isinf(span_end)) break;
     }
 #endif
     return lit;

@@ -3,26 +3,26 @@
 #include "range_fraction.glsl"
 #include <math.glsl>
 
-uniform sampler2DArray filtered;  // two terms a layer: means of sin and cos of c z over the filter, 0 where nothing is
+uniform sampler2DArray filtered_map;  // two terms per layer: means of sin(c z) and cos(c z), 0 where the map is empty
 uniform float offset;
 
-// The step of the depth test as a Fourier series: 1 where z is beyond t, 1/2 where they are equal.
-float step_series(vec2 means, float c, float t) {
+// Term of the Fourier series of the depth test: the sum is 1 for z beyond t, and 1/2 for z = t.
+float series_term(vec2 means, float c, float t) {
     return 2.0 / c * (cos(c * t) * means.x - sin(c * t) * means.y);
 }
 
-float map_visibility(int layer, vec3 place) {
-    float full = textureLod(covered, vec3(place.xy, float(layer)), 0.0).r;
-    // The series climbs from 1/2 to 1 within this much; a receiver that the map holds must not be its own caster.
-    float t = range_fraction(MAP_VIEWS[layer], place) - offset * 0.3 / float(TERMS);
-    float lit = 0.5 * full;
+float map_visibility(int layer, vec3 coords) {
+    float covered = textureLod(coverage, vec3(coords.xy, float(layer)), 0.0).r;
+    // The series rises from 1/2 to 1 within this offset, so that a receiver that is in the map is not half in shadow.
+    float t = range_fraction(MAP_VIEWS[layer], coords) - offset * 0.3 / float(TERMS);
+    float lit = 0.5 * covered;
     for (int k = 0; k < TERMS; k += 2) {
-        vec4 means = textureLod(filtered, vec3(place.xy, float(layer * ((TERMS + 1) / 2) + k / 2)), 0.0);
+        vec4 means = textureLod(filtered_map, vec3(coords.xy, float(layer * ((TERMS + 1) / 2) + k / 2)), 0.0);
         float c = PI * float(2 * k + 1);
-        lit += step_series(means.xy, c, t);
-        if (k + 1 < TERMS) lit += step_series(means.zw, c + 2.0 * PI, t);
+        lit += series_term(means.xy, c, t);
+        if (k + 1 < TERMS) lit += series_term(means.zw, c + 2.0 * PI, t);
     }
-    return clamp(lit + 1.0 - full, 0.0, 1.0);
+    return clamp(lit + 1.0 - covered, 0.0, 1.0);
 }
 
 #include "map_shadow.glsl"

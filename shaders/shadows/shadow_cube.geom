@@ -1,4 +1,4 @@
-// Each triangle in every layer whose view it is not outside of.
+// Sends each triangle to every layer whose view frustum it may intersect.
 #include <pass_view.glsl>
 layout(triangles) in;
 layout(triangle_strip, max_vertices = 3 * PASS_VIEW_COUNT) out;
@@ -20,7 +20,7 @@ centroid out vec4 v_color;
 #endif
 #endif
 
-// Whether all corners are beyond one side of the view, or behind it.
+// Whether all corners are beyond the same side plane of the view frustum.
 bool is_outside(vec4 a, vec4 b, vec4 c) {
     vec3 w = vec3(a.w, b.w, c.w);
     vec3 x = vec3(a.x, b.x, c.x);

@@ -1,5 +1,5 @@
-// Positions in the world, for a geometry shader that sees them from every view, and what an alpha mask needs.
-#include "layered_names.glsl"
+// World-space positions for a geometry shader that projects them into every view, and varyings of alpha masks.
+#include "layered_varyings.glsl"
 #include <mask_vertex.glsl>
 #include <transform.glsl>
 

@@ -1,4 +1,4 @@
-// How much of the picture goes where the stencil lets through.
+// Darkens the picture where the stencil test passes: alpha is the fraction of radiance that blending removes.
 uniform float strength;
 out vec4 radiance;
 

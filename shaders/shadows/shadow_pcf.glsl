@@ -1,5 +1,5 @@
-// Percentage-closer filtering (Reeves, Salesin and Cook 1987): the mean of depth tests around a place in the map, each
-// weighted bilinearly. Four tests come with one gather. One tap is the plain test of one texel.
+// Percentage-closer filtering (Reeves, Salesin and Cook 1987): the mean of bilinearly weighted depth tests in a kernel
+// around the receiver. One gather returns four tests. With one tap it is a single depth test.
 uniform sampler2DArrayShadow shadow_map;
 
 #if TAPS == 1
@@ -9,13 +9,14 @@ uniform sampler2DArrayShadow shadow_map;
 #endif
 
 #if TAPS == 1
-float filtered_tests(int layer, vec3 place) {
-    return texture(shadow_map, vec4(place.xy, float(layer), place.z));
+float filtered_visibility(int layer, vec3 coords) {
+    return texture(shadow_map, vec4(coords.xy, float(layer), coords.z));
 }
 
 #elif KERNEL == KERNEL_BOX || KERNEL == KERNEL_TENT
-// TAPS x TAPS tests one texel apart are (TAPS + 1) x (TAPS + 1) texels, the outer ones counted in part.
-float weight(int tap) {
+// TAPS × TAPS bilinear tests, one texel apart, read (TAPS + 1) × (TAPS + 1) texels, the outer ones with a partial
+// weight.
+float tap_weight(int tap) {
 #if KERNEL == KERNEL_TENT
     return float(max(min(tap + 1, TAPS - tap), 0));
 #else
@@ -23,26 +24,26 @@ float weight(int tap) {
 #endif
 }
 
-// How much texel `index` counts where the kernel begins at the fraction `start` of the first.
-float share(int index, float start) {
-    return mix(weight(index), weight(index - 1), start);
+// Weight of texel `index` along one axis; `fraction` is the kernel's start within the first texel.
+float texel_weight(int index, float fraction) {
+    return mix(tap_weight(index), tap_weight(index - 1), fraction);
 }
 
-float filtered_tests(int layer, vec3 place) {
+float filtered_visibility(int layer, vec3 coords) {
     vec2 size = vec2(textureSize(shadow_map, 0).xy);
-    vec2 texel = 1.0 / size;
-    vec2 corner = place.xy * size - 0.5 * float(TAPS);
-    vec2 first = floor(corner);
-    vec2 start = corner - first;
+    vec2 texel_size = 1.0 / size;
+    vec2 start = coords.xy * size - 0.5 * float(TAPS);
+    vec2 first = floor(start);
+    vec2 fraction = start - first;
     float sum = 0.0;
     for (int y = 0; y <= TAPS; y += 2) {
         for (int x = 0; x <= TAPS; x += 2) {
-            vec2 middle = (first + vec2(x + 1, y + 1)) * texel;
-            // Upper left, upper right, lower right, lower left.
-            vec4 lit = textureGather(shadow_map, vec3(middle, float(layer)), place.z);
-            vec2 columns = vec2(share(x, start.x), share(x + 1, start.x));
-            vec2 rows = vec2(share(y, start.y), share(y + 1, start.y));
-            sum += dot(lit, columns.xyyx * rows.yyxx);
+            vec2 gather_coords = (first + vec2(x + 1, y + 1)) * texel_size;
+            // Order of the tests: upper left, upper right, lower right, lower left.
+            vec4 tests = textureGather(shadow_map, vec3(gather_coords, float(layer)), coords.z);
+            vec2 weights_x = vec2(texel_weight(x, fraction.x), texel_weight(x + 1, fraction.x));
+            vec2 weights_y = vec2(texel_weight(y, fraction.y), texel_weight(y + 1, fraction.y));
+            sum += dot(tests, weights_x.xyyx * weights_y.yyxx);
         }
     }
 #if KERNEL == KERNEL_TENT
@@ -58,40 +59,40 @@ float filtered_tests(int layer, vec3 place) {
 #include <math.glsl>
 #include <noise.glsl>
 
-float filtered_tests(int layer, vec3 place) {
+float filtered_visibility(int layer, vec3 coords) {
     vec2 size = vec2(textureSize(shadow_map, 0).xy);
-    mat2 turn = mat2(0.5 * float(TAPS));
+    mat2 disc_to_texels = mat2(0.5 * float(TAPS));
 #if KERNEL == KERNEL_ROTATED
     float angle = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
-    turn *= mat2(cos(angle), sin(angle), -sin(angle), cos(angle));
+    disc_to_texels *= mat2(cos(angle), sin(angle), -sin(angle), cos(angle));
 #endif
     float sum = 0.0;
     for (int i = 0; i < SAMPLES; ++i) {
-        vec2 corner = place.xy * size + turn * poisson_disc[i] - 0.5;
-        vec2 first = floor(corner);
-        vec2 start = corner - first;
-        vec4 lit = textureGather(shadow_map, vec3((first + 1.0) / size, float(layer)), place.z);
-        vec2 row = mix(lit.wx, lit.zy, start.x);
-        sum += mix(row.x, row.y, start.y);
+        vec2 texel_coords = coords.xy * size + disc_to_texels * poisson_disc[i] - 0.5;
+        vec2 first = floor(texel_coords);
+        vec2 weights = texel_coords - first;
+        vec4 tests = textureGather(shadow_map, vec3((first + 1.0) / size, float(layer)), coords.z);
+        vec2 rows = mix(tests.wx, tests.zy, weights.x);
+        sum += mix(rows.x, rows.y, weights.y);
     }
     return sum / float(SAMPLES);
 }
 #endif
 
-#ifdef HAS_EDGES
-uniform sampler2DArray edges;  // the nearest and the farthest depth a kernel may meet that is centred in a tile
+#ifdef HAS_DEPTH_RANGES
+uniform sampler2DArray depth_ranges;  // nearest and farthest depth that a kernel centred in a tile may read
 
-float map_visibility(int layer, vec3 place) {
-    vec2 tiles = vec2(textureSize(edges, 0).xy);
-    ivec2 tile = ivec2(min(place.xy * tiles, tiles - 1.0));
-    vec2 range = texelFetch(edges, ivec3(tile, layer), 0).rg;
-    if (!nearer(range.x, place.z)) return 1.0;
-    if (nearer(range.y, place.z)) return 0.0;
-    return filtered_tests(layer, place);
+float map_visibility(int layer, vec3 coords) {
+    vec2 tiles = vec2(textureSize(depth_ranges, 0).xy);
+    ivec2 tile = ivec2(min(coords.xy * tiles, tiles - 1.0));
+    vec2 range = texelFetch(depth_ranges, ivec3(tile, layer), 0).rg;
+    if (!nearer(range.x, coords.z)) return 1.0;
+    if (nearer(range.y, coords.z)) return 0.0;
+    return filtered_visibility(layer, coords);
 }
 #else
-float map_visibility(int layer, vec3 place) {
-    return filtered_tests(layer, place);
+float map_visibility(int layer, vec3 coords) {
+    return filtered_visibility(layer, coords);
 }
 #endif
 

@@ -1,12 +1,12 @@
-// Percentage-closer soft shadows (R. Fernando, "Percentage-Closer Soft Shadows", 2005): first the mean distance of what
-// is in the way, then a filter as wide as the penumbra that a light of some size has behind it.
+// Percentage-closer soft shadows (R. Fernando, "Percentage-Closer Soft Shadows", 2005): a search for the mean distance
+// of the blockers, then a filter as wide as the penumbra that an area light casts from that distance.
 #include "poisson_disc.glsl"
 #include <math.glsl>
 #include <noise.glsl>
 
 uniform sampler2DArray shadow_map;
-uniform float size;        // metres across, of point and spot lights
-uniform float angle;       // radians across, of directional ones
+uniform float size;        // diameter of point and spot lights, metres
+uniform float angle;       // angular diameter of directional lights, radians
 uniform float max_radius;  // texels
 
 #define MAP_HALF_WIDTH 1.0
@@ -14,53 +14,54 @@ uniform float max_radius;  // texels
 vec2 map_slope;
 float map_texel;
 
-// How wide the penumbra is, in metres, of something at the distance `blocker` before a receiver at `receiver`.
-float penumbra(View view, float blocker, float receiver) {
-    float apart = max(receiver - blocker, 0.0);
-    return view.eye.w == 0.0 ? 2.0 * tan(0.5 * angle) * apart : size * apart / max(blocker, 1e-6);
+// Width in metres of the penumbra on a receiver; the arguments are distances from the light.
+float penumbra_width(View view, float blocker, float receiver) {
+    float separation = max(receiver - blocker, 0.0);
+    return view.eye.w == 0.0 ? 2.0 * tan(0.5 * angle) * separation : size * separation / max(blocker, 1e-6);
 }
 
-// Depth of the map at a point of the disc, and of the receiver's plane there.
-vec2 depths_at(int layer, vec3 place, vec2 apart, vec2 texels) {
-    vec3 at = vec3(place.xy + apart / texels, float(layer));
-    return vec2(textureLod(shadow_map, at, 0.0).r, place.z + dot(apart, map_slope));
+// Depth of the map (x) and of the receiver's plane (y) at an offset in texels.
+vec2 map_and_receiver_depth(int layer, vec3 coords, vec2 offset, vec2 map_size) {
+    vec3 tap = vec3(coords.xy + offset / map_size, float(layer));
+    return vec2(textureLod(shadow_map, tap, 0.0).r, coords.z + dot(offset, map_slope));
 }
 
-// The test at a point of the disc, weighted bilinearly over four texels.
-float bilinear_test(int layer, vec3 place, vec2 apart, vec2 texels) {
-    vec2 corner = place.xy * texels + apart - 0.5;
-    vec2 start = fract(corner);
-    vec4 depths = textureGather(shadow_map, vec3((floor(corner) + 1.0) / texels, float(layer)));
-    float receiver = place.z + dot(apart, map_slope);
-    vec4 lit = vec4(1.0);
-    for (int i = 0; i < 4; ++i) lit[i] = nearer(depths[i], receiver) ? 0.0 : 1.0;
-    vec2 row = mix(lit.wx, lit.zy, start.x);
-    return mix(row.x, row.y, start.y);
+// Bilinearly weighted depth test at an offset in texels.
+float bilinear_test(int layer, vec3 coords, vec2 offset, vec2 map_size) {
+    vec2 texel_coords = coords.xy * map_size + offset - 0.5;
+    vec2 weights = fract(texel_coords);
+    vec4 depths = textureGather(shadow_map, vec3((floor(texel_coords) + 1.0) / map_size, float(layer)));
+    float receiver = coords.z + dot(offset, map_slope);
+    vec4 tests = vec4(1.0);
+    for (int i = 0; i < 4; ++i) tests[i] = nearer(depths[i], receiver) ? 0.0 : 1.0;
+    vec2 rows = mix(tests.wx, tests.zy, weights.x);
+    return mix(rows.x, rows.y, weights.y);
 }
 
-float map_visibility(int layer, vec3 place) {
+float map_visibility(int layer, vec3 coords) {
     View view = shadow_map_views[layer];
-    vec2 texels = view.viewport.xy;
-    float receiver = linear_depth(view, place.xy, place.z);
-    float turned = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
-    mat2 turn = mat2(cos(turned), sin(turned), -sin(turned), cos(turned));
+    vec2 map_size = view.viewport.xy;
+    float receiver = linear_depth(view, coords.xy, coords.z);
+    float rotation_angle = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
+    mat2 rotation = mat2(cos(rotation_angle), sin(rotation_angle), -sin(rotation_angle), cos(rotation_angle));
 
-    // Anything from the near plane on may be in the way.
-    float search = min(0.5 * penumbra(view, view.range.x, receiver) / map_texel, max_radius);
+    // Blockers may be anywhere between the near plane and the receiver.
+    float search_radius = min(0.5 * penumbra_width(view, view.range.x, receiver) / map_texel, max_radius);
     float blockers = 0.0;
     float sum = 0.0;
     for (int i = 0; i < SEARCHES; ++i) {
-        vec2 there = depths_at(layer, place, turn * poisson_disc[i] * search, texels);
-        if (!nearer(there.x, there.y)) continue;
+        vec2 depths = map_and_receiver_depth(layer, coords, rotation * poisson_disc[i] * search_radius, map_size);
+        if (!nearer(depths.x, depths.y)) continue;
         blockers += 1.0;
-        sum += linear_depth(view, place.xy, there.x);
+        sum += linear_depth(view, coords.xy, depths.x);
     }
     if (blockers == 0.0) return 1.0;
 
-    float radius = clamp(0.5 * penumbra(view, sum / blockers, receiver) / map_texel, 0.5, max_radius);
+    float width = penumbra_width(view, sum / blockers, receiver);
+    float filter_radius = clamp(0.5 * width / map_texel, 0.5, max_radius);
     float lit = 0.0;
     for (int i = 0; i < SAMPLES; ++i) {
-        lit += bilinear_test(layer, place, turn * poisson_disc[i] * radius, texels);
+        lit += bilinear_test(layer, coords, rotation * poisson_disc[i] * filter_radius, map_size);
     }
     return lit / float(SAMPLES);
 }

@@ -1,4 +1,4 @@
-// Shadow on the receiver, but where an alpha mask cuts the caster away.
+// Shadows the receiver, except where the caster's alpha mask cuts it away.
 #ifdef ALPHA_MASK
 #include <alpha_mask.glsl>
 #include <base_color.glsl>

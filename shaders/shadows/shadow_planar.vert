@@ -1,26 +1,26 @@
-// A caster's vertices where the light throws them on the receiver's plane; what lies behind the plane, or behind the
-// light, is clipped.
+// Projects a caster's vertices along the light's rays onto the receiver's plane. Vertices behind the plane or behind
+// the light are clipped.
 #include <mask_vertex.glsl>
 #include <transform.glsl>
 
-struct Projection {
-    mat4 onto;
-    vec4 plane;  // above 0 on the light's side
+struct PlanarProjection {
+    mat4 matrix;
+    vec4 plane;  // positive on the light's side
 };
 layout(std430) readonly buffer projections {
-    Projection all_projections[];
+    PlanarProjection planar_projections[];
 };
 uniform int layer;
 
-const float ON_IT = 1e-4;  // metres: what lies in the plane casts nothing on it
+const float MIN_HEIGHT = 1e-4;  // metres: geometry in the plane casts no shadow on it
 
 void main() {
-    Projection p = all_projections[layer];
+    PlanarProjection projection = planar_projections[layer];
     write_alpha_mask_varyings();
     vec3 position = object_to_world(in_position);
-    float height = dot(p.plane, vec4(position, 1.0));
-    vec4 fallen = p.onto * vec4(position, 1.0);
-    gl_Position = PASS_VIEW.view_projection * fallen;
-    gl_ClipDistance[0] = height - ON_IT;
-    gl_ClipDistance[1] = fallen.w;
+    float height = dot(projection.plane, vec4(position, 1.0));
+    vec4 projected = projection.matrix * vec4(position, 1.0);
+    gl_Position = PASS_VIEW.view_projection * projected;
+    gl_ClipDistance[0] = height - MIN_HEIGHT;
+    gl_ClipDistance[1] = projected.w;
 }

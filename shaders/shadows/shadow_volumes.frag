@@ -1,4 +1,4 @@
-// What the stencil lets through is in shadow.
+// Pixels that pass the stencil test are in shadow.
 out vec4 visibility;
 
 void main() {

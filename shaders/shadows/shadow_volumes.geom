@@ -1,5 +1,5 @@
-// The part of a shadow volume that belongs to one triangle: nothing where it is turned away from the light; else a side
-// at each edge behind which the surface is, and the triangle itself and its image far away as ends.
+// The part of a shadow volume that one triangle generates. A triangle that faces the light emits a side quad at each
+// silhouette edge, and for the caps itself and its extrusion. Other triangles emit nothing.
 #include "lit_faces.glsl"
 
 layout(triangle_strip, max_vertices = 18) out;
@@ -10,38 +10,38 @@ void emit(vec4 position) {
 }
 
 void main() {
-    if (g_way[0] != COUNTED) return;
+    if (g_method[0] != METHOD) return;
     vec3 corners[3] = vec3[](g_position[0], g_position[2], g_position[4]);
-    vec3 beyond[3] = vec3[](g_position[1], g_position[3], g_position[5]);
-    if (!lit(corners[0], corners[1], corners[2])) return;
+    vec3 adjacent[3] = vec3[](g_position[1], g_position[3], g_position[5]);
+    if (!faces_light(corners[0], corners[1], corners[2])) return;
 
-    vec4 here[3], there[3];
+    vec4 near[3], far[3];
     for (int i = 0; i < 3; ++i) {
-        here[i] = clip_of(corners[i]);
-        there[i] = extruded(corners[i]);
+        near[i] = to_clip(corners[i]);
+        far[i] = extrude(corners[i]);
     }
-    bool turned = g_handedness[0] < 0.0;  // a mirrored object's corners run the other way round
+    bool is_mirrored = g_handedness[0] < 0.0;  // a mirrored object has the opposite winding order
     for (int i = 0; i < 3; ++i) {
         int next = (i + 1) % 3;
-        if (lit(corners[next], corners[i], beyond[i])) continue;
-        int start = turned ? next : i, stop = turned ? i : next;
-        emit(here[stop]);
-        emit(here[start]);
-        emit(there[stop]);
-        emit(there[start]);
+        if (faces_light(corners[next], corners[i], adjacent[i])) continue;
+        int start = is_mirrored ? next : i, stop = is_mirrored ? i : next;
+        emit(near[stop]);
+        emit(near[start]);
+        emit(far[stop]);
+        emit(far[start]);
         EndPrimitive();
     }
-    int second = turned ? 2 : 1, third = turned ? 1 : 2;
-#if COUNTED == Z_FAIL
-    emit(here[0]);
-    emit(here[second]);
-    emit(here[third]);
+    int second = is_mirrored ? 2 : 1, third = is_mirrored ? 1 : 2;
+#if METHOD == Z_FAIL
+    emit(near[0]);
+    emit(near[second]);
+    emit(near[third]);
     EndPrimitive();
 #endif
-    if ((COUNTED == Z_FAIL || length_of_sides > 0.0) && has_far_end()) {
-        emit(there[0]);
-        emit(there[third]);
-        emit(there[second]);
+    if ((METHOD == Z_FAIL || length_of_sides > 0.0) && has_far_cap()) {
+        emit(far[0]);
+        emit(far[third]);
+        emit(far[second]);
         EndPrimitive();
     }
 }

@@ -1,7 +1,7 @@
-// One colour; what lies over one another adds up by its opacity.
-uniform vec4 tinted;  // display-referred RGB, opacity
+// A constant translucent colour.
+uniform vec4 face_color;  // display-referred RGB, opacity
 out vec4 color;
 
 void main() {
-    color = tinted;
+    color = face_color;
 }

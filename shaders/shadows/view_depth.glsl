@@ -1,4 +1,4 @@
-// Texture coordinates and depth as metres behind a view's near plane, in any projection.
-float view_depth(View view, vec3 place) {
-    return linear_depth(view, place.xy, place.z) - view.range.x;
+// Distance in metres from a view's near plane, for any projection. `coords` are texture coordinates and window depth.
+float view_depth(View view, vec3 coords) {
+    return linear_depth(view, coords.xy, coords.z) - view.range.x;
 }

@@ -203,10 +203,10 @@ def test_layers_share_what_they_are_filtered_through(tmp_path: Path) -> None:
     loaded = rg.load("forward", scene=stage(tmp_path, *LIGHTS), size=(160, 120), sets=sets)
     resources = loaded.expand().expansion.resources
     descs = {name: each.desc for name, each in resources.items() if isinstance(each.desc, TextureDesc)}
-    assert descs["shadows.filtered"].layers == 9
-    assert descs["shadows.columns"].layers == 1
-    assert (descs["shadows.columns"].width, descs["shadows.columns"].height) == (256, 64)
-    assert resources["shadows.covered"].lights == (0, 1, 2, 2, 2, 2, 2, 2, 3)
+    assert descs["shadows.filtered_map"].layers == 9
+    assert descs["shadows.filtered_columns"].layers == 1
+    assert (descs["shadows.filtered_columns"].width, descs["shadows.filtered_columns"].height) == (256, 64)
+    assert resources["shadows.coverage"].lights == (0, 1, 2, 2, 2, 2, 2, 2, 3)
 
 
 @pytest.mark.parametrize("kind", list(WIDE))

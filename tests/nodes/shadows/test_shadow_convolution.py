@@ -28,8 +28,8 @@ def test_given_values(glsl_function: Callable[..., float], shared: Path) -> None
         for k in range(1, case["M"] + 1):
             c = np.pi * (2 * k - 1)
             at = f"vec2(sin({c * case['occluder']!r}), cos({c * case['occluder']!r}))"
-            terms.append(f"step_series({at}, {c!r}, {case['receiver']!r})")
-        found = glsl_function("shadow_convolution.glsl", "step_series", " + ".join(["0.5", *terms]))
+            terms.append(f"series_term({at}, {c!r}, {case['receiver']!r})")
+        found = glsl_function("shadow_convolution.glsl", "series_term", " + ".join(["0.5", *terms]))
         assert found == pytest.approx(case["value"], abs=2e-5)
 
 

@@ -30,8 +30,8 @@ def test_the_bound_from_four_means(glsl_function: Callable[..., float]) -> None:
     for _ in range(12):
         points, weights = np.sort(rng.uniform(0.05, 0.95, 5)), rng.dirichlet(np.ones(5))
         b, t = means(points, weights), float(rng.uniform(0.1, 0.9))
-        call = f"share_before(vec4({', '.join(map(repr, b.tolist()))}), {t!r})"
-        found = glsl_function("shadow_msm.glsl", "share_before", call, moment_bias=0.0)
+        call = f"fraction_before(vec4({', '.join(map(repr, b.tolist()))}), {t!r})"
+        found = glsl_function("shadow_msm.glsl", "fraction_before", call, moment_bias=0.0)
         assert found == pytest.approx(bound(b, t), abs=3e-3)
         assert found <= weights[points < t].sum() + 3e-3
 
@@ -40,8 +40,8 @@ def test_two_surfaces_are_told_apart_exactly(glsl_function: Callable[..., float]
     for share in (0.1, 0.5, 0.8):
         b = means(np.array([0.3, 0.7]), np.array([share, 1 - share]))
         for t, expected in ((0.25, 0.0), (0.5, share), (0.7, share)):
-            call = f"share_before(vec4({', '.join(map(repr, b.tolist()))}), {t!r})"
-            found = glsl_function("shadow_msm.glsl", "share_before", call, moment_bias=3e-6)
+            call = f"fraction_before(vec4({', '.join(map(repr, b.tolist()))}), {t!r})"
+            found = glsl_function("shadow_msm.glsl", "fraction_before", call, moment_bias=3e-6)
             assert found == pytest.approx(expected, abs=0.02)
 
 
@@ -49,7 +49,7 @@ def test_two_surfaces_are_told_apart_exactly(glsl_function: Callable[..., float]
 def test_two_points_suffice_where_the_polynomial_is_linear(glsl_function: Callable[..., float], t: float) -> None:
     """Then the third point is infinitely far and has no weight; dividing by its coefficient left black pixels."""
     found = glsl_function(
-        "shadow_msm.glsl", "share_before", f"share_before(vec4(0, 0.25, 0, 0.125), {t})", moment_bias=0.0
+        "shadow_msm.glsl", "fraction_before", f"fraction_before(vec4(0, 0.25, 0, 0.125), {t})", moment_bias=0.0
     )
     assert found == pytest.approx(0.5 if t > 0 else 0, abs=1e-3)
 

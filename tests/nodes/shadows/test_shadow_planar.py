@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from rendergraph.nodes.shadows.shadow_planar import projection_on
+from rendergraph.nodes.shadows.shadow_planar import planar_projection
 
 import rendergraph as rg
 from rendergraph.api import projection
@@ -46,7 +46,7 @@ def test_the_matrix_is_the_documents(shared: Path) -> None:
     cases = json.loads((shared / "reference" / "b6_math" / "vectors.json").read_text())["planar_shadow"]["cases"]
     assert cases
     for case in cases:
-        made = projection_on(np.array(case["plane"]), np.array(case["light"]))
+        made = planar_projection(np.array(case["plane"]), np.array(case["light"]))
         np.testing.assert_allclose(made, case["matrix"], atol=1e-12)
 
 
@@ -54,7 +54,7 @@ def test_points_fall_on_the_plane_along_the_light() -> None:
     random = np.random.default_rng(2)
     for w in (0.0, 1.0):
         plane, light, point = random.normal(size=4), np.append(random.normal(size=3), w), random.normal(size=3)
-        fallen = projection_on(plane, light) @ np.append(point, 1)
+        fallen = planar_projection(plane, light) @ np.append(point, 1)
         fallen = fallen[:3] / fallen[3]
         assert abs(plane[:3] @ fallen + plane[3]) < 1e-9
         along = light[:3] - w * point

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from rendergraph.nodes.shadows._trapezoid import apex_distance, trapezoid_around, trapezoid_to_square, warped
+from rendergraph.nodes.shadows._trapezoid import apex_distance, trapezoid_around, trapezoid_to_square, warp_view
 
 import rendergraph as rg
 from rendergraph.api import ViewMatrices, projection
@@ -70,7 +70,7 @@ def clip(view: ViewMatrices, points: Floats) -> Floats:
 def test_what_is_seen_is_in_the_map(eye: Any, focus: float) -> None:
     seen = camera(eye, (0, 0, -60))
     plain, points = uniform(seen)
-    made = warped(plain, points, seen, focus, 8)
+    made = warp_view(plain, points, seen, focus, 8)
     assert not np.array_equal(made.projection, plain.projection)
     assert np.abs(clip(made, points)).max() <= 1 - 16 / 1024 * 0.99
     casters = np.random.default_rng(0).uniform(BOX[0], BOX[1], (2000, 3))
@@ -91,7 +91,7 @@ def test_texels_change_smoothly_with_the_camera() -> None:
         target = eye + (12 * math.sin(0.02 * frame), -1, -30)
         seen = camera(eye, target)
         plain, points = uniform(seen)
-        made = warped(plain, points, seen, 0.1, 8)
+        made = warp_view(plain, points, seen, 0.1, 8)
         here = eye + 6 * (target - eye) / np.linalg.norm(target - eye)
         steps = [
             np.diff(clip(made, np.array([here, here + 0.01 * axis]))[:, :2], axis=0)[0] for axis in np.eye(3)[[0, 2]]

@@ -18,10 +18,10 @@ def test_the_bound_on_given_moments(glsl_function: Callable[..., float], shared:
     cases = json.loads((shared / "reference" / "b7_post" / "values.json").read_text())["vsm"]["cases"]
     assert any(0 < case["p_reduced"] < 1 for case in cases)
     for case in cases:
-        call = f"share_behind(vec2({case['mean']!r}, {case['mean_square']!r}), {case['receiver']!r})"
+        call = f"chebyshev_bound(vec2({case['mean']!r}, {case['mean_square']!r}), {case['receiver']!r})"
         for bleeding, expected in ((0.0, case["p"]), (case["p_min"], case["p_reduced"])):
             found = glsl_function(
-                "shadow_vsm.glsl", "share_behind", call, min_variance=case["min_variance"], light_bleeding=bleeding
+                "shadow_vsm.glsl", "chebyshev_bound", call, min_variance=case["min_variance"], light_bleeding=bleeding
             )
             assert found == pytest.approx(expected, rel=2e-3, abs=1e-5)
 
