@@ -15,8 +15,8 @@ import rendergraph as rg
 
 def test_given_values(glsl_function: Callable[..., float], shared: Path) -> None:
     for case in json.loads((shared / "reference" / "b7_post" / "values.json").read_text())["esm"]["cases"]:
-        call = f"share_lit(exponent * {case['occluder']!r}, 0.0, {case['receiver']!r})"
-        found = glsl_function("shadow_esm.glsl", "share_lit", call, exponent=case["c"])
+        call = f"exponential_visibility(exponent * {case['occluder']!r}, 0.0, {case['receiver']!r})"
+        found = glsl_function("shadow_esm.glsl", "exponential_visibility", call, exponent=case["c"])
         assert found == pytest.approx(case["value"], rel=1e-4)
 
 
