@@ -118,7 +118,8 @@ class FrameContext(Struct, eq=False):
             text = f"it writes '{port.name}', which holds last frame's values; write an Internal and copy it in a step"
             raise Misuse(text, "RG433")
         array = np.ascontiguousarray(values)
-        if array.dtype.kind not in "biuf":
+        element = self.executable.plan.resources[name].desc.element  # type: ignore[union-attr]  # it is a buffer
+        if array.dtype.kind not in "biuf" and (element is None or array.dtype != element.dtype):
             raise Misuse(f"write is given {type(values).__name__} of {array.dtype}, not an array of numbers", "RG433")
         data, size = array.tobytes(), self.executable.memory.buffer(name).size
         if len(data) > size:

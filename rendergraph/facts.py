@@ -9,7 +9,7 @@ from msgspec import Struct, field
 from msgspec.structs import astuple
 
 from rendergraph.errors import SceneError, suggestion
-from rendergraph.textures import EnvironmentMap, Semantic, TextureDesc
+from rendergraph.textures import BufferDesc, EnvironmentMap, Layout, Semantic, TextureDesc
 
 SELECTIONS: Mapping[str, Callable[[bool, bool], bool]] = {
     "all": lambda casts, blended: True,
@@ -139,6 +139,7 @@ class TextureInfo(Struct, frozen=True, gc=False):
         lights: the scene's light index of each layer or view, empty if they belong to no lights.
         bytes: size of a buffer, 0 for textures.
         views: number of views of a table of views, 0 for everything else.
+        element: what a buffer holds, if its port declares it.
     """
 
     desc: TextureDesc | None
@@ -147,6 +148,12 @@ class TextureInfo(Struct, frozen=True, gc=False):
     lights: tuple[int, ...] = ()
     bytes: int = 0
     views: int = 0
+    element: Layout | None = None
+
+    @property
+    def storage(self) -> TextureDesc | BufferDesc:
+        """What a texture or buffer is allocated from."""
+        return self.desc if self.desc is not None else BufferDesc(self.bytes, self.element)
 
     @property
     def holds_values(self) -> bool:

@@ -14,7 +14,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from rendergraph.facts import Facts
-from rendergraph.textures import FORMATS, EnvironmentMap, Filter, Kind, Sampler, Semantic, Signature, Wrap
+from rendergraph.textures import FORMATS, EnvironmentMap, Filter, Kind, Layout, Sampler, Semantic, Signature, Wrap
 from rendergraph.typecheck import Known, Length, Range, validated
 
 T = TypeVar("T")
@@ -24,6 +24,7 @@ Ruled: TypeAlias = T | Rule[T]
 
 Meaning: TypeAlias = Annotated[Semantic, "a Semantic such as Radiance"]
 Called: TypeAlias = Annotated[Signature, "a Signature such as ShadowLookup"]
+Elements: TypeAlias = Annotated[Layout, "a Layout such as Layout('Spark', {'position': 'vec3'})"]
 Count: TypeAlias = Annotated[int, Range(0)]
 Texel: TypeAlias = Annotated[float | tuple[float, ...], Length(1, 4), "a number, up to four of them"]
 """One value for every channel, or one a channel."""
@@ -122,6 +123,7 @@ class Input(Port, frozen=True, eq=False):
         many: it takes a list.
         use: `sample` it, attach it read-only for the `depth_test`, or load it as an `image`.
         group: the name of the group it belongs to.
+        element: the elements that a buffer must have.
     """
 
     semantic: Meaning | Called
@@ -137,6 +139,7 @@ class Input(Port, frozen=True, eq=False):
     many: bool = False
     use: Literal["sample", "depth_test", "image"] = "sample"
     group: str | None = None
+    element: Elements | None = None
     doc: str = ""
 
     def link(self, number: int) -> Part:
@@ -171,6 +174,7 @@ class WrittenPort(Port, frozen=True, eq=False):
         samples: samples per texel; by default those of `like`, else of an input of the same size that is attached for
             the `depth_test`, else 1.
         bytes: size of a `buffer`.
+        element, count: what a buffer holds, and how many of them, in place of `bytes`.
         clear: initial contents; None discards, for passes that write every texel.
         first: value of every channel in the first frame for readers of `@previous`; 0 by default, and for a continued
             texture the value of its first writer.
@@ -188,6 +192,8 @@ class WrittenPort(Port, frozen=True, eq=False):
     layers: Ruled[Count] | None = None
     samples: Samples | Rule[int] | None = None
     bytes: Ruled[Count] = 0
+    element: Elements | None = None
+    count: Ruled[Count] = 0
     clear: Ruled[Texel | None] = None
     first: float | None = None
     view: str | None = None

@@ -5,6 +5,9 @@ Nothing here touches GL: a format knows its GL enum as a number so that `gl` nee
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from typing import Any as AnyType
 from typing import Literal
 
 from msgspec import Struct
@@ -243,10 +246,59 @@ class TextureDesc(Struct, frozen=True, gc=False):
         return FORMATS[self.format].view_class, *shape
 
 
+_STD430 = {  # GLSL type: NumPy type of a component, shape, alignment in components (OpenGL 4.5, section 7.6.2.2)
+    f"{prefix}{shape or scalar}": (kind, size, align)
+    for prefix, scalar, kind in (("", "float", "<f4"), ("i", "nt", "<i4"), ("u", "int", "<u4"))
+    for shape, size, align in (("", (), 1), ("vec2", (2,), 2), ("vec3", (3,), 4), ("vec4", (4,), 4))
+} | {"mat4": ("<f4", (4, 4), 4)}
+
+
+class Layout(Struct, frozen=True):
+    """The elements of a buffer, the same in GLSL and in NumPy: `Layout("Spark", {"position": "vec3", "age": "float"})`.
+
+    Shaders that use the buffer may use the struct of that name. Matrices are arrays of columns.
+
+    Attributes:
+        name: the name of the struct.
+        fields: field to GLSL type: `float`, `int` or `uint`, their vectors, or `mat4`.
+    """
+
+    name: str
+    fields: Mapping[str, str]
+
+    def __post_init__(self) -> None:
+        wrong = [f"{kind} {name}" for name, kind in self.fields.items() if kind not in _STD430]
+        if wrong or not self.fields:
+            raise TypeError(f"Layout '{self.name}' cannot hold {wrong or 'nothing'}; available: {', '.join(_STD430)}")
+
+    def __hash__(self) -> int:
+        return hash(self.name)
+
+    @property
+    def dtype(self) -> AnyType:
+        """The structured `numpy.dtype` of an array of elements, with the padding of std430."""
+        import numpy as np  # not needed to list nodes
+
+        names, formats, offsets, at, most = list(self.fields), [], [], 0, 4
+        for kind, shape, align in (_STD430[kind] for kind in self.fields.values()):
+            at, most = -(-at // (4 * align)) * 4 * align, max(most, 4 * align)
+            formats.append((kind, shape))
+            offsets.append(at)
+            at += 4 * math.prod(shape)
+        total = -(-at // most) * most
+        return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": total})
+
+    @property
+    def glsl(self) -> str:
+        """The definition of the struct."""
+        return f"struct {self.name} {{ {' '.join(f'{kind} {name};' for name, kind in self.fields.items())} }};"
+
+
 class BufferDesc(Struct, frozen=True):
-    """A buffer of `bytes` bytes."""
+    """A buffer of `bytes` bytes, with elements if its port declares them."""
 
     bytes: int
+    element: Layout | None = None
 
 
 def full_mip_count(width: int, height: int, depth: int = 1) -> int:

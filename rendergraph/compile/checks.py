@@ -9,7 +9,7 @@ from typing import Any
 
 from rendergraph.declare import Node
 from rendergraph.errors import InputError, Problem, suggestion
-from rendergraph.gl.programs import Program, Uniform, outputs_of
+from rendergraph.gl.programs import Program, Uniform, member_offsets, outputs_of
 from rendergraph.glsl.globals import globals_of
 from rendergraph.program import Texts, named_reads, unfit_outputs, unfit_sampler
 from rendergraph.steps import Read, Resource, Step, Write
@@ -41,6 +41,7 @@ def check_program(
         _uniforms(step, program, uniforms, sampled, texts),
         _samplers(step, program, resources, texts),
         _blocks(step, program, blocks, texts),
+        _elements(step, program, resources, texts),
         _outputs(step, program, cls, resources, texts),
         _stored(step, program, resources, texts),
     ):
@@ -105,6 +106,23 @@ def _blocks(step: Step, program: Program, given: Collection[str], texts: Texts) 
         if name not in given:
             text = f"{files} looks at block '{name}', but the step has no buffer of that name; it has {own}"
             yield _placed(step.problem("RG430", text), name, texts)
+
+
+def _elements(step: Step, program: Program, resources: Mapping[str, Resource], texts: Texts) -> Iterator[Problem]:
+    """A block whose elements lie elsewhere than declared would read other fields, or others than NumPy wrote."""
+    uses: dict[str, Read | Write] = {**dict(named_reads(step)), **{write.name: write for write in step.writes}}
+    for name in program.storage.keys() & uses.keys():
+        desc = resources[uses[name].resource].desc
+        if not isinstance(desc, BufferDesc) or desc.element is None:
+            continue
+        element = desc.element
+        for member, at in member_offsets(program, name).items():
+            field = member.rpartition(".")[2]
+            if field not in element.fields or (at - element.dtype.fields[field][1]) % element.dtype.itemsize:
+                text = f"'{member}' of block '{name}' is at byte {at}, which does not fit the elements of "
+                text += f"'{uses[name].resource}'; declare {element.name} values[]; in it: {element.glsl}"
+                yield _placed(step.problem("RG438", text), name, texts)
+                break
 
 
 def _outputs(

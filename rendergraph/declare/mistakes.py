@@ -149,11 +149,12 @@ def _alone(name: str, port: Port) -> Iterator[str]:
         if port.semantic is None and port.like is None and not isinstance(port, Internal | History):
             yield f"port '{name}' has neither a semantic nor `like`"
         if port.kind != "buffer":
-            if port.bytes != 0:
-                yield f"port '{name}' has bytes={quoted(port.bytes)}, but is not a buffer; add kind='buffer'"
+            if port.bytes != 0 or port.element is not None:
+                what = f"bytes={quoted(port.bytes)}" if port.element is None else "elements"
+                yield f"port '{name}' has {what}, but is not a buffer; add kind='buffer'"
             return
-        if port.bytes == 0:
-            yield f"port '{name}' is a buffer without bytes; add bytes=…, from 1 up"
+        if (port.bytes == 0) == (port.element is None or port.count == 0):
+            yield f"port '{name}' is a buffer without bytes; add bytes=…, from 1 up, or element=… and count=…"
         if port.first not in (None, 0):
             yield f"port '{name}' is a buffer, which holds 0 before the first frame, not {port.first!r}"
         if not callable(port.clear) and port.clear not in (None, 0):

@@ -22,7 +22,6 @@ from rendergraph.expand.recording import record_all
 from rendergraph.expand.versions import assign_versions
 from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import Read, Resource, Role, Step, Write
-from rendergraph.textures import BufferDesc
 
 
 def expand(graph: Graph, wanted: Mapping[str, Endpoint] | None = None) -> Expansion:
@@ -75,8 +74,8 @@ def _mark_roles(
         if str(end) in previous and str(end) not in resources:  # its node is idle: it stays as it first was
             port, info = graph[end.node].node.ports()[end.port], graph.textures[end]
             assert isinstance(port, WrittenPort)
-            desc, first = info.desc or BufferDesc(info.bytes), port.first or 0.0
-            resources[str(end)] = Resource(str(end), desc, "history", first, info.view, info.lights)
+            first = port.first or 0.0
+            resources[str(end)] = Resource(str(end), info.storage, "history", first, info.view, info.lights)
     for name in set(shown.values()) | previous:
         resource = resources[name]
         role: Role = "history" if name in previous else "output"

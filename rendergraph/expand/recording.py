@@ -71,10 +71,8 @@ class Recording:
 
     def desc(self, port: Port) -> TextureDesc | BufferDesc:
         if isinstance(port, Input):
-            found = self.facts.input(port.name).desc
-            return found if found is not None else BufferDesc(self.facts.input(port.name).bytes)
-        info = self.graph.textures[Endpoint(self.node.id, port.name)]
-        return info.desc if info.desc is not None else BufferDesc(info.bytes)
+            return self.facts.input(port.name).storage
+        return self.graph.textures[Endpoint(self.node.id, port.name)].storage
 
     def used(self, port: Port) -> bool:
         return port.name in self.used_ports

@@ -95,9 +95,8 @@ class _VersionAssignment:
                     self.final[end] = self.final[before]
                 continue
             info = self.graph.textures[end]
-            desc = info.desc if info.desc is not None else BufferDesc(info.bytes)
             id = str(end)
-            self.resources[id] = Resource(id, desc, _role(made), made.first or 0.0, info.view, info.lights)
+            self.resources[id] = Resource(id, info.storage, _role(made), made.first or 0.0, info.view, info.lights)
             self.version[id] = 0
             self.written[id] = set()
             self.final[end] = id, 0
@@ -207,8 +206,7 @@ class _VersionAssignment:
     def _desc_of(self, end: Endpoint, resource: str) -> TextureDesc | BufferDesc:
         if resource in self.resources:
             return self.resources[resource].desc
-        info = self.graph.textures[end.now]  # last frame's value of a node further down
-        return info.desc if info.desc is not None else BufferDesc(info.bytes)
+        return self.graph.textures[end.now].storage  # last frame's value of a node further down
 
     def _write(
         self, recording: Recording, request: StepRequest, name: str, part: Part, value: Any

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _UNIFORM, _UNIFORM_BLOCK, _OUTPUT, _STORAGE_BLOCK = 0x92E1, 0x92E2, 0x92E4, 0x92E6
 _NAME_LENGTH, _TYPE, _ARRAY_SIZE, _BLOCK_INDEX, _LOCATION = 0x92F9, 0x92FA, 0x92FB, 0x92FD, 0x930E
-_ACTIVE, _BUFFER_DATA_SIZE = 0x92F5, 0x9303
+_ACTIVE, _BUFFER_DATA_SIZE, _BUFFER_VARIABLE, _OFFSET = 0x92F5, 0x9303, 0x92E5, 0x92FC
 _LINK_STATUS = 0x8B82
 
 _VALUES = {  # GL type: name in GLSL, ending of the `glProgramUniform…` that writes it
@@ -205,6 +205,17 @@ def outputs_of(program: Program) -> dict[str, str]:
         raw.glGetProgramResourceiv(glo, _OUTPUT, index, 1, (ctypes.c_uint * 1)(_TYPE), 1, None, kind)
         found[_name(raw, glo, _OUTPUT, index).removesuffix("[0]")] = _VALUES[kind[0]][0]
     return {name: glsl for name, glsl in found.items() if not name.startswith("gl_")}
+
+
+def member_offsets(program: Program, block: str) -> dict[str, int]:
+    """Return the byte offsets of the active members of a storage block, by their names as in `sparks[0].age`."""
+    raw, glo, found = program.device.raw, program.glo, {}
+    asked, values = (ctypes.c_uint * 2)(_BLOCK_INDEX, _OFFSET), (ctypes.c_int * 2)()
+    for index in range(_count(raw, glo, _BUFFER_VARIABLE)):
+        raw.glGetProgramResourceiv(glo, _BUFFER_VARIABLE, index, 2, asked, 2, None, values)
+        if values[0] == program.storage[block]:
+            found[_name(raw, glo, _BUFFER_VARIABLE, index)] = values[1]
+    return found
 
 
 def _inspect(program: Program) -> None:

@@ -71,6 +71,9 @@ class Checker(Struct, eq=False):
                 yield from _samples(port, info, info.desc.samples)
             if expected := self._format(draft, port, FORMATS[info.desc.format]):
                 yield "RG215", expected, f"has the format {info.desc.format}", None
+        elif isinstance(port, Input) and port.element not in (None, info.element):
+            has = info.element.glsl if info.element is not None else "no declared elements"
+            yield "RG215", f"expects elements {port.element.glsl}", f"has {has}", None
 
     def _format(self, draft: UnlinkedNode, port: Input, texel: Format) -> str:
         if port.use == "depth_test" and not texel.is_depth:

@@ -219,8 +219,11 @@ class TextureInference:
     def _made(self, end: Endpoint, draft: UnlinkedNode, port: WrittenPort) -> TextureInfo:
         like = self._linked(draft, port.like)
         if port.kind == "buffer":
-            size = self._checked_value(end, "bytes", port.bytes, Positive)
-            return TextureInfo(None, port.semantic or textures.Any, bytes=size)
+            if port.element is None:
+                size = self._checked_value(end, "bytes", port.bytes, Positive)
+            else:
+                size = port.element.dtype.itemsize * self._checked_value(end, "count", port.count, Positive)
+            return TextureInfo(None, port.semantic or textures.Any, bytes=size, element=port.element)
         semantic = port.semantic or (like.semantic if like is not None else textures.Any)
         view, lights = self._view(end, draft, port, semantic)
         drawing_view = self._drawing_view(draft) if view is None and port.like is None else None

@@ -198,11 +198,18 @@ class _Program(Struct, frozen=True):
             source = with_formats(source, step, self.resources)
         extensions, source = _hoisted(source)
         body = functions.text + source.text
-        declarations = _read_declarations(step.reads, self.resources, "", body)
+        declarations = self._elements(body) + _read_declarations(step.reads, self.resources, "", body)
         text = view + declarations + functions + source
         aliases, warnings = find_old_names(text, include_folder)
         head = generated([VERSION, *extensions]) + _macro_text({**aliases, **_used_macros(self.macros, text.text)})
         return StageText(stage, head + text, step.node, tuple(warnings))
+
+    def _elements(self, body: str) -> SourceText:
+        """Return the structs of the buffers that the step uses, as far as the text names them."""
+        uses: tuple[Read | Write, ...] = (*self.step.all_reads, *self.step.writes)
+        found = [getattr(self.resources[use.resource].desc, "element", None) for use in uses]
+        structs = [each.glsl for each in dict.fromkeys(found) if each is not None and mentions(body, each.name)]
+        return generated(structs, "the elements of the step's buffers") if structs else SourceText()
 
     def _functions(self, stage: str, signature: Signature, includes: Includes) -> SourceText:
         """Return the providers' texts with prefixed names, and the function that joins them."""

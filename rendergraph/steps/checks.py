@@ -97,7 +97,7 @@ def texels(
         Misuse: they are not numbers, or do not fill the texture or fit the buffer.
     """
     array = np.asarray(values)
-    if array.dtype.kind not in "biuf":
+    if array.dtype.kind not in "biuf" and array.dtype != getattr(getattr(desc, "element", None), "dtype", None):
         raise Misuse(f"'{name}' is given {type(values).__name__} of {array.dtype}, not an array of numbers")
     if isinstance(desc, BufferDesc):
         if array.nbytes > desc.bytes:
