@@ -157,7 +157,8 @@ class CountsVolumes(HasVolumes):
                 depth_func="greater",
                 depth_write=False,
                 depth_clamp=self.depth_clamp,
-                polygon_offset=(0.0, DEPTH_OFFSET),
+                # Only Z-fail has near caps. Sides need no offset: it would leave surfaces beside an edge undecided.
+                polygon_offset=(0.0, DEPTH_OFFSET) if method == Z_FAIL else None,
                 cull="none",
                 front="counter_clockwise",
                 stencil=_COUNTING[method],
