@@ -86,8 +86,8 @@ class ImageBasedLight(Node):
         size=_cells_size,
         mips=lambda node, facts: _cells_side(node).bit_length() - _COARSEST,
         kept=True,
-        doc="Direction of the light of each cell, weighted by luminance, which locates a small light such as the sun; "
-        "float32, because half floats are too coarse for narrow lobes.",
+        doc="Mean direction of the light of each cell, such as that of the sun; float32, because half floats are too "
+        "coarse for narrow lobes.",
     )
     cube = Internal(
         kind="texture_cube",
