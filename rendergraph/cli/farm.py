@@ -127,8 +127,8 @@ def _template(
     import yaml  # for this action alone
 
     from rendergraph.compare.export.openjd import template
-    from rendergraph.compare.listing import list_sweep
     from rendergraph.compare.prepare import prepare
+    from rendergraph.compare.runner import list_sweep
 
     class Plain(yaml.SafeDumper):
         def ignore_aliases(self, data: Any) -> bool:

@@ -17,7 +17,7 @@ from rendergraph.errors import InputError, Problem, RenderError, UsageError
 
 if TYPE_CHECKING:
     from rendergraph.compare import Axis, Space, Sweep
-    from rendergraph.compare.listing import Listing
+    from rendergraph.compare.runner import Listing
     from rendergraph.compare.sweepfile import SweepFile
     from rendergraph.session import Selection
 
@@ -142,8 +142,8 @@ def command(
     if how.minimise and space.samples:
         raise UsageError(Problem("RG500", "--minimise and --samples exclude each other"))
     if listing:
-        from rendergraph.compare.listing import list_sweep
         from rendergraph.compare.prepare import prepare
+        from rendergraph.compare.runner import list_sweep
 
         with at_its_lines(file):
             prepared = prepare(base, space, out or Path(), against, how)

@@ -6,19 +6,26 @@ import contextlib
 import hashlib
 import pickle
 import queue
+import shutil
+import tempfile
+import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from importlib import import_module
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 from uuid import uuid4
 
-from rendergraph.errors import InputError, Problem, RenderError, UsageError
-from rendergraph.farm.bundle import Bundle, make_bundle
-from rendergraph.farm.tasks import Event, Executor, Handle, Task, TaskFailed, TaskFinished, TaskOutput, is_retryable
-from rendergraph.installed import require, version
+import distributed
+from distributed import WorkerPlugin, get_worker
 
-Client: TypeAlias = Any  # an extra, of which most is not typed
+from rendergraph.errors import InputError, Problem, RenderError, RendergraphError, UsageError
+from rendergraph.farm.bundle import Bundle, check_packages, make_bundle
+from rendergraph.farm.tasks import Event, Executor, Handle, Task, TaskFailed, TaskFinished, TaskOutput, is_retryable
+from rendergraph.farm.worker_process import WorkerProcess
+from rendergraph.installed import version
+
+_distributed: Any = distributed  # most of it is not typed
+Client: TypeAlias = Any
 Cluster: TypeAlias = Any
 Future: TypeAlias = Any
 
@@ -33,10 +40,9 @@ _WORKER_LEAVES = (OSError, KeyError, ValueError)
 
 
 def start_local_cluster(count: int, devices: Sequence[int | None], *, timeout: float) -> Dask:
-    distributed = _import_distributed()
     # Its workers are threads of this process, and each has a process of its own by its `WorkerSetup`: Dask's way of
     # starting processes would run the caller's script once more.
-    cluster = distributed.LocalCluster(
+    cluster = _distributed.LocalCluster(
         n_workers=count,
         threads_per_worker=1,
         processes=False,
@@ -44,20 +50,19 @@ def start_local_cluster(count: int, devices: Sequence[int | None], *, timeout: f
         silence_logs=50,
         scheduler_kwargs={"dashboard_address": ":0"},  # it serves status anyway; any port that is free
     )
-    return Dask(distributed.Client(cluster, set_as_default=False), devices, timeout=timeout, cluster=cluster)
+    return Dask(_distributed.Client(cluster, set_as_default=False), devices, timeout=timeout, cluster=cluster)
 
 
 def connect(choice: Any, device: int | None, *, timeout: float) -> Dask:
     """Connect to the cluster at an address, `dask://host:port`, or to that of a `Client`, which stays open."""
-    distributed = _import_distributed()
-    if isinstance(choice, distributed.Client):
+    if isinstance(choice, _distributed.Client):
         return Dask(choice, (device,), timeout=timeout)
     if not isinstance(choice, str):
         text = f"expected an executor's name, an Executor or a Dask Client, got {type(choice).__name__}"
         raise UsageError(Problem("RG641", text))
     address = choice.removeprefix("dask://")
     try:
-        client = distributed.Client(f"tcp://{address}", timeout=CONNECT_SECONDS, set_as_default=False)
+        client = _distributed.Client(f"tcp://{address}", timeout=CONNECT_SECONDS, set_as_default=False)
     except OSError:
         text = f"no Dask scheduler answers at {address}; start one: dask scheduler"
         raise RenderError(Problem("RG641", text)) from None
@@ -66,11 +71,6 @@ def connect(choice: Any, device: int | None, *, timeout: float) -> Dask:
         text = f"the Dask scheduler at {address} has no workers; start some: dask worker {address}"
         raise RenderError(Problem("RG641", text))
     return Dask(client, (device,), timeout=timeout, owned=True)
-
-
-def _import_distributed() -> Any:
-    require("a Dask cluster", "farm", "distributed")
-    return import_module("distributed")
 
 
 def _workers(client: Client) -> dict[str, Any]:
@@ -109,8 +109,6 @@ class Dask(Executor):
         self._upload_of: dict[Task, int] = {}  # the upload that a task was submitted with
 
     def upload_inputs(self, make: Callable[[], Bundle]) -> None:
-        from rendergraph.farm.dask_worker import WorkerSetup, setup_error  # needs the extra
-
         bundle = make()
         paths = {digest: Path(path) for path, digest in bundle.files.items() if digest not in self._paths}
         self._upload({digest: path.read_bytes() for digest, path in paths.items()})
@@ -172,8 +170,6 @@ class Dask(Executor):
         return handle
 
     def submit(self, task: Task) -> None:
-        from rendergraph.farm.dask_worker import run_task  # needs the extra
-
         if self._bundle is None:
             self.upload_inputs(lambda: make_bundle((), ()))
         assert self._bundle is not None
@@ -261,3 +257,79 @@ class Dask(Executor):
                 self._client.close(timeout=1)
             if self._cluster is not None:
                 self._cluster.close(timeout=1)
+
+
+# --- on a worker -----------------------------------------------------------------------------------------------------
+
+# Tasks do not run in the Dask worker's own process: a driver that hangs there could not be ended, and one that crashes
+# would take the worker with it.
+
+
+class WorkerSetup(WorkerPlugin):
+    """One on each worker while the executor exists; tasks find it by its name."""
+
+    def __init__(
+        self, name: str, packages: Mapping[str, tuple[str, str]], devices: Sequence[int | None], timeout: float
+    ) -> None:
+        self.name = name
+        self._packages, self._devices, self._timeout = packages, tuple(devices), timeout
+
+    def setup(self, worker: Any) -> None:
+        self._lock = threading.Lock()
+        self._bundle = ""
+        self._folder = Path(tempfile.mkdtemp(prefix="rendergraph-", dir=worker.local_directory))
+        (self._folder / "stored").mkdir()
+        address = str(worker.address)
+        number = worker.name if isinstance(worker.name, int) else 0
+        device = self._devices[number % len(self._devices)]
+        self._process = WorkerProcess(address, device, timeout=self._timeout)
+        self.error = check_packages(self._packages, address)
+
+    def teardown(self, worker: Any) -> None:
+        self._process.kill()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def run(
+        self, task: bytes, values: Mapping[str, bytes], bundle: Bundle, files: Mapping[str, bytes]
+    ) -> list[tuple[str, Any]]:
+        """Return all outputs of a task, each with its kind; the last one is `finished`, `failed` or `lost`."""
+        with self._lock:
+            if self.error is not None:
+                return [("lost", self.error)]
+            root = self._folder / bundle.digest[:16]
+            if bundle.digest != self._bundle:
+                self._process.kill()
+                self._write(bundle, root, files)
+            messages: list[tuple[str, Any]] = []
+            try:
+                self._process.send(
+                    pickle.loads(task), values, bundle.environment(root), root=str(root), home=bundle.home
+                )
+                while not messages or messages[-1][0] == "item":
+                    messages.append(self._process.receive())
+            except RendergraphError as error:
+                messages.append(("lost", error))
+            return messages
+
+    def _write(self, bundle: Bundle, root: Path, files: Mapping[str, bytes]) -> None:
+        for digest, content in files.items():
+            path = self._folder / "stored" / digest
+            if not path.exists():
+                path.write_bytes(content)
+        bundle.write(root, self._folder / "stored")
+        self._bundle = bundle.digest
+
+
+def run_task(
+    setup: str, task: bytes, needs: Sequence[str], bundle: Bundle, digests: Sequence[str], *contents: bytes
+) -> tuple[str, list[tuple[str, Any]]]:
+    """Run one of our tasks as a Dask task; `contents` are the files' by digest, then the values that the task needs."""
+    worker: Any = get_worker()
+    files = dict(zip(digests, contents[: len(digests)], strict=True))
+    values = dict(zip(needs, contents[len(digests) :], strict=True))
+    return str(worker.address), worker.plugins[setup].run(task, values, bundle, files)
+
+
+def setup_error(setup: str, dask_worker: Any) -> RendergraphError | None:
+    error: RendergraphError | None = dask_worker.plugins[setup].error
+    return error

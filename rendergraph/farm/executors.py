@@ -12,6 +12,7 @@ from rendergraph.errors import Problem, UsageError
 from rendergraph.farm.processes import Processes
 from rendergraph.farm.tasks import Executor, Serial
 from rendergraph.farm.worker_process import TIMEOUT
+from rendergraph.installed import require
 
 if TYPE_CHECKING:
     from rendergraph.session.gpu import Gpu
@@ -60,15 +61,15 @@ def make_executor(
         except ValueError as error:
             raise UsageError(Problem("RG641", str(error))) from None
         kind, number = _NAME.fullmatch(choice).groups()  # type: ignore[union-attr]  # it was checked
-    if kind is not None:
+    if kind == "processes":
         count, shared = _machine(device, devices)
-        if kind == "processes":
-            return Processes(int(number or count), shared, timeout=timeout)
-        from rendergraph.farm.dask_cluster import start_local_cluster  # an extra
+        return Processes(int(number or count), shared, timeout=timeout)
+    require("a Dask cluster", "farm", "distributed")
+    from rendergraph.farm.dask_cluster import connect, start_local_cluster  # an extra
 
+    if kind == "dask":
+        count, shared = _machine(device, devices)
         return start_local_cluster(int(number or count), shared, timeout=timeout)
-    from rendergraph.farm.dask_cluster import connect  # see above
-
     return connect(choice, device, timeout=timeout)
 
 

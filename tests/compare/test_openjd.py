@@ -20,8 +20,8 @@ from rendergraph.cli.app import main
 from rendergraph.compare.engine import sweep
 from rendergraph.compare.export.openjd import numbers_text, parse_numbers, template
 from rendergraph.compare.export.shards import measure, render_frames
-from rendergraph.compare.listing import list_sweep
 from rendergraph.compare.prepare import prepare
+from rendergraph.compare.runner import list_sweep
 from rendergraph.compare.store import ResultsLog
 from rendergraph.errors import InputError
 from rendergraph.images import read

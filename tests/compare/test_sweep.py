@@ -17,10 +17,10 @@ from rendergraph.cli.compare import summary
 from rendergraph.compare.batches import batches
 from rendergraph.compare.engine import sweep
 from rendergraph.compare.export.table import csv_text
-from rendergraph.compare.listing import list_sweep
 from rendergraph.compare.prepare import prepare
 from rendergraph.compare.report import sweep_page
 from rendergraph.compare.results import pareto
+from rendergraph.compare.runner import list_sweep
 from rendergraph.compare.space import Axis, Space, parse_axis, pipelines, typed
 from rendergraph.compare.store import RESULTS, ResultsLog, checksum, kept_runs, line_schema
 from rendergraph.errors import InputError

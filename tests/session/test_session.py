@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import rendergraph as rg
-from rendergraph.authoring.gl_state import flush_deleted_programs
+from rendergraph.authoring.node_check import flush_deleted_programs
 from rendergraph.errors import InputError, Problem, RenderError, UsageError
 from rendergraph.gl.raw import RawGL
 from rendergraph.resources import shipped_pipelines

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from rendergraph.compare.listing import Listing
+from rendergraph.compare.runner import Listing
 from rendergraph.errors import InputError, Problem
 
 MOST_TASKS = 1024

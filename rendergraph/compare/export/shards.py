@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from rendergraph.compare.engine import Sweep, sweep
 from rendergraph.compare.export.openjd import numbers_text
-from rendergraph.compare.listing import is_complete
 from rendergraph.compare.prepare import SweepOptions, prepare
+from rendergraph.compare.runner import is_complete
 from rendergraph.compare.store import RUN, make_folder
 from rendergraph.errors import Place, Problem, RenderError
 
