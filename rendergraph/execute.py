@@ -217,7 +217,7 @@ class Runner(Struct, eq=False):
             updates[node.id] = perf_counter() - before
         stale = {key: values for key, values in executable.uploads.items() if values.is_stale}
         for key, values in stale.items():
-            with _blamed(self.graph[key[0]], "the function of an upload"):
+            with _author_errors(self.graph[key[0]], "the function of an upload"):
                 values.compute()
         if stale:
             executable.computed(stale)
@@ -283,7 +283,7 @@ class Runner(Struct, eq=False):
         self.executable.fresh = False
 
     def _update(self, node: GraphNode, index: int, time: float, camera: ViewMatrices, scene: FrameScene) -> None:
-        with _blamed(node, "update"):
+        with _author_errors(node, "update"):
             frame = FrameContext(self.executable, self.graph, node, index, time, camera, scene)
             node.node.update(frame)  # pyright: ignore[reportArgumentType]  # a cached_property is a property to mypy
 
@@ -302,7 +302,7 @@ class Runner(Struct, eq=False):
         node = self._jittering
         if node is None:
             return camera
-        with _blamed(node, "camera_jitter"):
+        with _author_errors(node, "camera_jitter"):
             moved = node.node.camera_jitter(self.drawn)
             check_argument("what camera_jitter returns", moved, _Offset)
         x, y = (value / side for value, side in zip(moved, camera.size, strict=True))
@@ -365,7 +365,7 @@ def _views_first(graph: Graph) -> list[GraphNode]:
 
 
 @contextmanager
-def _blamed(node: GraphNode, method: str) -> Iterator[None]:
+def _author_errors(node: GraphNode, method: str) -> Iterator[None]:
     """Say of what fails in a stranger's method where it stands."""
     try:
         yield

@@ -321,7 +321,7 @@ def _memory(
 def _reasons(plan: ResourcePlan) -> dict[str, str]:
     schedule, lifetimes, physicals, placement = plan.schedule, plan.lifetimes, plan.physicals, plan.placement
     names = step_names(schedule.steps)
-    outputs = {id: name for name, id in reversed(list(schedule.wanted.items()))}
+    outputs = {id: name for name, id in reversed(list(schedule.outputs.items()))}
     kinds, what = _alike(plan)
     count: dict[object, int] = defaultdict(int)
     for id in schedule.resources:

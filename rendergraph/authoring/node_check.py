@@ -224,7 +224,7 @@ class NodeCheck:
             runner.run(frame, (frame - 1) / 30, 1 / 30, scene, camera)
         runner.check()
         pictures = {}
-        for name, shown in plan.schedule.wanted.items():
+        for name, shown in plan.schedule.outputs.items():
             own = f"{self.type.name}.{name}"  # a buffer's own bytes instead of its reader's picture
             is_buffer = own in plan.placement and isinstance(plan.resources[own].desc, BufferDesc)
             pictures[name] = runner.read(own if is_buffer else shown)

@@ -46,7 +46,7 @@ def commands(packed: PackedScene, meshes: Records) -> Records:
     return found
 
 
-def seen(packed: PackedScene, view: ViewMatrices, *, clamped: bool = False) -> Bools:
+def visible_objects(packed: PackedScene, view: ViewMatrices, *, clamped: bool = False) -> Bools:
     """Which objects a view may see, bool (n,): false where an object's box lies beyond one side of it.
 
     Args:
@@ -111,7 +111,7 @@ class SceneView(Struct, eq=False):
         chosen = table if self.index is None else (table[self.index],)
         visible: Bools | None = None
         if self.culls and cull:
-            visible = np.logical_or.reduce([seen(packed, view, clamped=self.clamped) for view in chosen])
+            visible = np.logical_or.reduce([visible_objects(packed, view, clamped=self.clamped) for view in chosen])
         depths = -(packed.centers @ chosen[0].view[2, :3] + chosen[0].view[2, 3])
         for each in self.lists:
             each.update(visible, depths)

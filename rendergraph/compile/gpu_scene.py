@@ -84,7 +84,7 @@ class GpuScene(Struct, eq=False, dict=True):
     _blocks: dict[str, tuple[moderngl.Buffer, bool]] = {}
     _environment: GpuTexture | None = None
     _before: moderngl.Buffer | None = None
-    _behind: set[int] = set()  # objects that have moved since the frame before was kept
+    _stale_instances: set[int] = set()  # objects that have moved since the frame before was kept
 
     def __post_init__(self) -> None:
         ctx, packed = self.device.ctx, self.packed
@@ -137,16 +137,16 @@ class GpuScene(Struct, eq=False, dict=True):
             moved = moved[packed.instances[moved] != self.packed.instances[moved]]
             if len(moved):
                 write_records(self._instances, packed.instances, moved)
-                self._behind.update(moved.tolist())
+                self._stale_instances.update(moved.tolist())
                 self.changes["instances"] += 1
         self.scene, self.packed = scene, packed
 
     def advance(self) -> None:
         """From now on where the objects are is where they were in the frame before; asked of what looks back."""
-        if self._before is not None and self._behind:
-            write_records(self._before, self.packed.instances, np.array(sorted(self._behind), np.int64))
+        if self._before is not None and self._stale_instances:
+            write_records(self._before, self.packed.instances, np.array(sorted(self._stale_instances), np.int64))
             self.changes["instances before"] += 1
-        self._behind.clear()
+        self._stale_instances.clear()
 
     def indices(self, topology: str) -> MeshIndices:
         """The indices of `triangles`, or of `triangles_adjacency`, which are found when somebody first draws them."""
@@ -174,7 +174,7 @@ class GpuScene(Struct, eq=False, dict=True):
     def _previous(self) -> moderngl.Buffer:
         """Where objects were in the frame before, kept as soon as a program looks at it."""
         if self._before is None:
-            self._behind.clear()
+            self._stale_instances.clear()
             self._before = self.device.ctx.buffer(self.packed.instances.tobytes() or bytes(64))
         return self._before
 

@@ -144,7 +144,7 @@ class Reuse(Struct, eq=False, dict=True):
     @cached_property
     def _goals(self) -> list[tuple[_Slot, Value]]:
         """What must be there at the end of a frame: what is shown, and what the next one remembers."""
-        shown = set(self.plan.schedule.wanted.values())
+        shown = set(self.plan.schedule.outputs.values())
         shown |= {id for id in self._versions.writers if self.plan.resources[id].role == "history"}
         return [self._at(id, last) for id in sorted(shown) if (last := self._last(id)) is not None and self._moves(id)]
 

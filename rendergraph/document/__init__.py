@@ -20,9 +20,9 @@ from rendergraph.document.values import BROKEN as BROKEN
 from rendergraph.document.values import Document as Document
 from rendergraph.document.values import Source as Source
 from rendergraph.document.values import Value as Value
+from rendergraph.document.values import describe as describe
 from rendergraph.document.values import from_plain as from_plain
 from rendergraph.document.values import kind_of as kind_of
-from rendergraph.document.values import said as said
 from rendergraph.document.values import shown as shown
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.stamps import record_read

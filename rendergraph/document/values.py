@@ -185,7 +185,7 @@ def kind_of(data: object) -> str:
     return "a mapping" if isinstance(data, Mapping) else "a list"
 
 
-def said(value: Value) -> str:
+def describe(value: Value) -> str:
     """Describe a value for messages, or quote it where it is short."""
     data = value.data
     if isinstance(data, str):

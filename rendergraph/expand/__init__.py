@@ -24,9 +24,9 @@ from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import Read, Resource, Role, Step, Write
 
 
-def expand(graph: Graph, wanted: Mapping[str, Endpoint] | None = None) -> Expansion:
-    """Record every node that `wanted` (name to port, the file's outputs by default) needs at the end of the frame."""
-    outputs = dict(graph.outputs if wanted is None else wanted)
+def expand(graph: Graph, outputs: Mapping[str, Endpoint] | None = None) -> Expansion:
+    """Record every node that `outputs` (name to port, the file's outputs by default) needs at the end of the frame."""
+    outputs = dict(graph.outputs if outputs is None else outputs)
     order = graph.reading_order()
     recorded, idle = record_all(graph, order, outputs)
     idle |= dict.fromkeys(graph.unlit, "the scene has no environment")
@@ -35,11 +35,11 @@ def expand(graph: Graph, wanted: Mapping[str, Endpoint] | None = None) -> Expans
     return expansion
 
 
-def _finalize(graph: Graph, found: VersionedSteps, wanted: Mapping[str, Endpoint]) -> Expansion:
+def _finalize(graph: Graph, found: VersionedSteps, outputs: Mapping[str, Endpoint]) -> Expansion:
     """Check that every output is written, copy versions that a later node overwrites, and assign final roles."""
     steps, resources = list(found.steps), dict(found.resources)
     shown: dict[str, str] = {}
-    for name, port in wanted.items():
+    for name, port in outputs.items():
         end = follow_forwards(found.forwarded, port)
         if end not in found.final or end.node in found.idle:
             reason = found.idle.get(end.node, "it makes no texture")

@@ -45,13 +45,13 @@ class Expansion(Struct, frozen=True):
     """All steps of a graph with their resources.
 
     Attributes:
-        wanted: output name or tap to the id of the resource that must exist at the end of the frame.
+        outputs: output name or tap to the id of the resource that must exist at the end of the frame.
         ports: port to the id of the resource that holds its texture or buffer.
     """
 
     steps: tuple[Step, ...]
     resources: Mapping[str, Resource]
-    wanted: Mapping[str, str]
+    outputs: Mapping[str, str]
     idle: Mapping[str, str] = field(default_factory=dict)
     views: Mapping[str, ViewTable] = field(default_factory=dict)
     ports: Mapping[Endpoint, str] = field(default_factory=dict)

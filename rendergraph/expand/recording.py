@@ -160,22 +160,22 @@ def is_kept(port: Port) -> bool:
 
 
 def record_all(
-    graph: Graph, order: list[str], wanted: Mapping[str, Endpoint]
+    graph: Graph, order: list[str], outputs: Mapping[str, Endpoint]
 ) -> tuple[dict[str, Recording], dict[str, str]]:
-    """Record every node that a wanted port needs; return recordings in order, and idle nodes with their reasons."""
-    history_readers = _history_readers(graph, wanted)
+    """Record every node that a outputs port needs; return recordings in order, and idle nodes with their reasons."""
+    history_readers = _history_readers(graph, outputs)
     while True:
-        recordings, idle = _record(graph, order, wanted, history_readers)
+        recordings, idle = _record(graph, order, outputs, history_readers)
         if not history_readers & idle.keys():
             return recordings, idle
         history_readers -= idle.keys()  # whoever does nothing does not read last frame's values either
 
 
-def _history_readers(graph: Graph, wanted: Mapping[str, Endpoint]) -> set[str]:
-    """Nodes that read last frame's values and contribute to a wanted port."""
+def _history_readers(graph: Graph, outputs: Mapping[str, Endpoint]) -> set[str]:
+    """Nodes that read last frame's values and contribute to a outputs port."""
     history_readers = {node.id for node in graph.nodes for ends in node.inputs.values() for end in ends if end.previous}
     reached: set[str] = set()
-    stack = [end.node for end in wanted.values()] if history_readers else []
+    stack = [end.node for end in outputs.values()] if history_readers else []
     while stack:
         name = stack.pop()
         if name not in reached:
@@ -185,11 +185,11 @@ def _history_readers(graph: Graph, wanted: Mapping[str, Endpoint]) -> set[str]:
 
 
 def _record(
-    graph: Graph, order: list[str], wanted: Mapping[str, Endpoint], history_readers: set[str]
+    graph: Graph, order: list[str], outputs: Mapping[str, Endpoint], history_readers: set[str]
 ) -> tuple[dict[str, Recording], dict[str, str]]:
     """`history_readers` may come earlier in the order than the nodes whose last values they read."""
     demanded: dict[str, set[str]] = {name: set() for name in order}
-    for end in wanted.values():
+    for end in outputs.values():
         demanded[end.node].add(end.port)
     for name in history_readers:
         for ends in graph[name].inputs.values():

@@ -24,7 +24,7 @@ from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import FunctionBinding, Read, Resource, Role, Step, StepRequest, Use, Where, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
 
-_TAKEN_OVER = frozenset(
+_COPIED_OPTIONS = frozenset(
     """
     label state region objects materials order in_place per_light topology command commands instances invocations
     """.split()  # noqa: SIM905 - a list of so many words reads best as text
@@ -166,7 +166,7 @@ class _VersionAssignment:
             where=Where(node.place, request.caller),
             if_drawn=_condition_step(recording, options.get("if_drawn", ""), index),
             **counts,
-            **{key: value for key, value in options.items() if key in _TAKEN_OVER},
+            **{key: value for key, value in options.items() if key in _COPIED_OPTIONS},
         )
 
     def _reads(self, recording: Recording, name: str, part: Part) -> list[Read]:

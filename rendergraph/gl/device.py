@@ -80,7 +80,7 @@ class Device(Struct, eq=False, dict=True):
             saved.restore()
 
     @property
-    def gone(self) -> bool:
+    def is_released(self) -> bool:
         """Whether the context has been released, as its owner may do."""
         return not hasattr(self.ctx.mglo, "fbo")
 

@@ -82,7 +82,7 @@ class Links:
 
     def __init__(self) -> None:
         self._followed: dict[str, str] = {}
-        self._led: dict[Path, str] = {}
+        self._targets: dict[Path, str] = {}
         self._files: dict[tuple[Path, str, Path], Path | None] = {}
 
     def follow(self, path: str) -> str:
@@ -100,9 +100,9 @@ class Links:
 
     def of(self, path: Path) -> str:
         """Return the same for a path that may be relative to the current folder."""
-        found = self._led.get(path)
+        found = self._targets.get(path)
         if found is None:
-            found = self._led[path] = self.follow(str(path if path.is_absolute() else Path.cwd() / path))
+            found = self._targets[path] = self.follow(str(path if path.is_absolute() else Path.cwd() / path))
         return found
 
     def file(self, folder: Path, name: str, home: Path) -> Path | None:

@@ -30,7 +30,7 @@ class Origin(Struct, frozen=True):
         shared: it comes from an include in angle brackets.
         prefix: the prefix of the names that the file declares.
         by: the line that includes the file, None for the file of a stage itself.
-        made: the purpose of a generated line, as in "the views of 'depth'".
+        purpose: that of a generated line, as in "the views of 'depth'".
     """
 
     file: Path | None = None
@@ -39,7 +39,7 @@ class Origin(Struct, frozen=True):
     shared: bool = False
     prefix: str = ""
     by: Origin | None = None
-    made: str = ""
+    purpose: str = ""
 
     def place(self, column: int = 1) -> Place | None:
         """Return the place for messages, relative to the current folder where possible."""
@@ -100,9 +100,9 @@ class SourceText(Struct, frozen=True, dict=True):
         return SourceText(self.blocks + other.blocks)
 
 
-def generated(lines: Iterable[str], made: str = "") -> SourceText:
-    """Return lines of no file; `made` is their purpose."""
-    return SourceText((SourceBlock(tuple(lines), Origin(made=made)),))
+def generated(lines: Iterable[str], purpose: str = "") -> SourceText:
+    """Return lines of no file."""
+    return SourceText((SourceBlock(tuple(lines), Origin(purpose=purpose)),))
 
 
 _PARAMETER = re.compile(r"<([A-Z][A-Z0-9_]*)>\Z")

@@ -7,7 +7,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from rendergraph.document import BROKEN, Value, said, shown
+from rendergraph.document import BROKEN, Value, describe, shown
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.keys.tables import Key, MapOf, Recursive, Table, Type
 from rendergraph.typecheck import conversion_to, hint_for, test_of, words_for
@@ -87,7 +87,7 @@ class Validator:
             expected, hint = words_for(type, file=True), hint_for(plain, type)
         if data is not BROKEN:
             example = f", as in {key.example}" if key.example else ""
-            text = f"'{shown(name)}': expected {expected}{example}, got {said(value)}{hint}"
+            text = f"'{shown(name)}': expected {expected}{example}, got {describe(value)}{hint}"
             self.report(value, key.code or self.codes.wrong, text)
         return None
 

@@ -71,9 +71,9 @@ class Connector(Struct, eq=False):
         elif value.data is not None:
             self._follow(draft, name, value, name)
 
-    def _follow(self, draft: UnlinkedNode, name: str, value: Value, wanted: str) -> None:
+    def _follow(self, draft: UnlinkedNode, name: str, value: Value, port: str) -> None:
         try:
-            found = self.references.follow(draft.spec.scope, value, wanted)
+            found = self.references.follow(draft.spec.scope, value, port)
         except InputError as error:
             draft.failed.add(name)
             for problem in error.problems:

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import Extensions, Input, Node, Output, Parameter
 from rendergraph.declare.blame import author_problem
-from rendergraph.document import Value, said, shown
+from rendergraph.document import Value, describe, shown
 from rendergraph.errors import InputError, Problem, is_interruption, nearest, node_named, shown_file, suggestion
 from rendergraph.glsl.source import needs, needs_place
 from rendergraph.keys import MOST_PROBLEMS
@@ -48,9 +48,9 @@ def _unfit(
             parameters[name].convert(plain)
         except TypeError as error:
             hint = suggestion(value.data, parameters[name].words, most=0) if isinstance(value.data, str) else ""
-            yield name, value.problem("RG104", f"'{spec.id}.{name}': {error}, got {said(value)}{hint}")
+            yield name, value.problem("RG104", f"'{spec.id}.{name}': {error}, got {describe(value)}{hint}")
         except ValueError as error:
-            yield name, value.problem("RG104", f"'{spec.id}.{name}' is {said(value)}, it {error}")
+            yield name, value.problem("RG104", f"'{spec.id}.{name}' is {describe(value)}, it {error}")
 
 
 def _refused(spec: NodeSpec, node_type: NodeType, values: Mapping[str, Any], error: BaseException) -> Problem:

@@ -68,17 +68,17 @@ class References(Struct, eq=False):
     spec: PipelineSpec
     types: Mapping[str, NodeType]
 
-    def follow(self, scope: str, value: Value, wanted: str) -> Link | None:
+    def follow(self, scope: str, value: Value, default_port: str) -> Link | None:
         """Return the link to the port that a reference names; None for an optional sub-pipeline input without a link.
 
         Args:
             scope: the sub-pipeline that contains the reference.
-            wanted: the port that a node's id alone stands for.
+            default_port: the port that a node's id alone stands for.
 
         Raises:
             InputError: it leads nowhere; without problems where the reason has been reported.
         """
-        link = self._reference(scope, value, wanted, 0)
+        link = self._reference(scope, value, default_port, 0)
         return replace(link, value=value) if link is not None and link.value is not value else link
 
     def outputs_of(self, scope: str, name: str) -> list[str]:
@@ -103,29 +103,29 @@ class References(Struct, eq=False):
         names += [inside[:-1] for inside, found in self.spec.scopes.items() if found.parent == scope]
         return [name.removeprefix(scope) for name in names[:500]] + (["inputs"] if scope else [])
 
-    def _reference(self, scope: str, value: Value, wanted: str, depth: int) -> Link | None:
+    def _reference(self, scope: str, value: Value, default_port: str, depth: int) -> Link | None:
         match = _LINK.match(value.data) if isinstance(value.data, str) else None
         if match is None:
-            text = f"'{shown(value.data)}' is not a link; write node.port, or a node's id for its port '{wanted}'"
+            text = f"'{shown(value.data)}' is not a link; write node.port, or a node's id for its port '{default_port}'"
             raise InputError(value.problem("RG113", text))
         if depth > 100:
             text = f"'{shown(value.data)}' leads back to itself; link it to a node's port"
             raise InputError(value.problem("RG117", text))
-        link = self._follow(scope, match[1], match[2], wanted, value, depth)
+        link = self._follow(scope, match[1], match[2] or default_port, value, depth)
         if link is None or not match[3]:
             return link
         return replace(link, source=link.source._replace(previous=True))
 
-    def _follow(self, scope: str, name: str, port: str | None, wanted: str, value: Value, depth: int) -> Link | None:
+    def _follow(self, scope: str, name: str, port: str, value: Value, depth: int) -> Link | None:
         if name == "inputs" and scope:
-            return self._outside(scope, port or wanted, value, depth)
-        if name == "inputs" and (declared := self.spec.tree.get("inputs", port or wanted)):
+            return self._outside(scope, port, value, depth)
+        if name == "inputs" and (declared := self.spec.tree.get("inputs", port)):
             if flag(declared, "optional"):
                 return None
             raise InputError(())  # a sub-pipeline run on its own
         inner = self.spec.scopes.get(f"{scope}{name}/")
         if inner is not None:
-            return self._inside(f"{scope}{name}/", port, wanted, value, depth)
+            return self._inside(f"{scope}{name}/", port, value, depth)
         node = self.spec.nodes.get(f"{scope}{name}")
         if node is None and (("nodes", name) in self.spec.dropped or not self.spec.nodes):
             raise InputError(())
@@ -134,9 +134,9 @@ class References(Struct, eq=False):
         node_type = self.types.get(node.id)
         if node_type is None:
             raise InputError(())
-        if (port or wanted) not in node_type.cls.outputs():
-            raise InputError(value.problem("RG112", self._no_output(node, node_type, port, wanted, value)))
-        return Link(Endpoint(node.id, port or wanted), value)
+        if port not in node_type.cls.outputs():
+            raise InputError(value.problem("RG112", self._no_output(node, node_type, port, value)))
+        return Link(Endpoint(node.id, port), value)
 
     def _outside(self, scope: str, port: str, value: Value, depth: int) -> Link | None:
         found = self.spec.scopes[scope]
@@ -157,31 +157,28 @@ class References(Struct, eq=False):
         entered = SubgraphInput(f"{scope[:-1]}.{port}", word(found.inputs[port], "semantic"), given)
         return replace(link, declared=(*link.declared, entered))
 
-    def _inside(self, scope: str, port: str | None, wanted: str, value: Value, depth: int) -> Link | None:
+    def _inside(self, scope: str, port: str, value: Value, depth: int) -> Link | None:
         outputs = self.spec.scopes[scope].outputs
-        inner = outputs.get(port or wanted)
-        if inner is None:
-            name = shown(scope[:-1])
-            text = f"sub-pipeline '{name}' has no output '{port or wanted}'{suggestion(port or wanted, outputs)}"
+        if port not in outputs:
+            text = f"sub-pipeline '{shown(scope[:-1])}' has no output '{port}'{suggestion(port, outputs)}"
             raise InputError(value.problem("RG112", text))
-        return self._reference(scope, inner, port or wanted, depth + 1)
+        return self._reference(scope, outputs[port], port, depth + 1)
 
-    def _no_output(self, node: NodeSpec, node_type: NodeType, port: str | None, wanted: str, value: Value) -> str:
+    def _no_output(self, node: NodeSpec, node_type: NodeType, port: str, value: Value) -> str:
         outputs = node_type.cls.outputs()
-        name = port or wanted
-        text = f"node '{node.id}' of {line_of(node.place, value.place)} ({node_type.name}) has no output '{name}'"
-        if port is None:
+        text = f"node '{node.id}' of {line_of(node.place, value.place)} ({node_type.name}) has no output '{port}'"
+        if "." not in str(value.data):
             return f"{text}; name one as in {node.id}.PORT{suggestion('', outputs)}"
-        if name in node_type.cls.inputs():
-            return f"{text}, only an input of that name{suggestion(name, outputs)}"
-        return text + suggestion(name, outputs)
+        if port in node_type.cls.inputs():
+            return f"{text}, only an input of that name{suggestion(port, outputs)}"
+        return text + suggestion(port, outputs)
 
 
-def line_of(place: Place, here: Place) -> str:
+def line_of(place: Place, other: Place) -> str:
     """Name a place in a message about another place: its line, and its file only where that differs."""
     if not place.line:
         return str(place.origin)
-    return f"line {place.line}" if place.origin == here.origin else f"{place.origin}:{place.line}"
+    return f"line {place.line}" if place.origin == other.origin else f"{place.origin}:{place.line}"
 
 
 def mark_without_environment(nodes: Mapping[str, UnlinkedNode]) -> None:

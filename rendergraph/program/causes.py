@@ -71,13 +71,13 @@ def causes(rows: Sequence[str], source: SourceText) -> list[DriverMessage]:
     words: list[str] = re.findall(r"[A-Za-z_]\w*", source.text)
     known = {*words, *_BUILT_IN.split()} - unknown.keys()
     kept: list[DriverMessage] = []
-    told: dict[str, int] = {}
+    reported: dict[str, int] = {}
     begun: set[int] = set()
     for message in errors:
         statement = _statement(source, message.line)
         if _UNKNOWN.search(message.text):
-            if message.text not in told:
-                told[message.text] = message.line
+            if message.text not in reported:
+                reported[message.text] = message.line
                 kept.append(replace(message, text=message.text + _near(message.text, known)))
         elif statement not in begun and not re.search(r"\berror\b", message.text):
             kept.append(message)

@@ -113,7 +113,7 @@ def _problem(code: str, message: DriverMessage, stage: StageText) -> Problem:
         shown_line = shown_line.replace(origin.prefix, "")
     if origin.file is None:
         near = _nearest_author(rows, shown_line, text)
-        what = f"what rendergraph writes for {origin.made}" if origin.made else "generated text"
+        what = f"what rendergraph writes for {origin.purpose}" if origin.purpose else "generated text"
         text += f" (in {what}: {shown_line.strip()})"
         place = near.place() if near else None
         return Problem(code, f"{stage.who}: {text}", place, severity=severity)

@@ -117,7 +117,7 @@ class _Scope:
                     continue
                 seen.add(name)
                 origin = text.source.origins[text.text.count("\n", 0, match.start())]
-                where = self._port(*buffers[name]) if name in buffers else origin.made or _file(origin.file)
+                where = self._port(*buffers[name]) if name in buffers else origin.purpose or _file(origin.file)
                 yield InScope("blocks", f"{name} {{ {members} }}", where)
         for before, read in self._reads():
             resource = self.resources[read.resource]
@@ -184,7 +184,7 @@ class _Scope:
         ):
             for one, origin in _globals(texts[stage].source, storage) if stage in texts else ():
                 name = " ".join([*sorted(one.qualifiers), _type(one), one.name])
-                yield InScope(section, name, f"{stage} shader, {origin.made or _file(origin.file)}")
+                yield InScope(section, name, f"{stage} shader, {origin.purpose or _file(origin.file)}")
 
     def outputs(self) -> Iterator[InScope]:
         for write in self.step.writes:
@@ -248,14 +248,14 @@ def annotated(text: StageText) -> str:
         if not line.strip():
             gap = True
             continue
-        made = "macros" if origin.made.startswith("the macro ") else origin.made
+        purpose = "macros" if origin.purpose.startswith("the macro ") else origin.purpose
         follows = origin.file == last.file and (
-            made == last.made if origin.file is None else origin.line == last.line + 1
+            purpose == last.purpose if origin.file is None else origin.line == last.line + 1
         )
         if not follows or (gap and origin.file is not None):
-            label = f"{_file(origin.file)}:{origin.line}" if origin.file is not None else made or "rendergraph"
+            label = f"{_file(origin.file)}:{origin.line}" if origin.file is not None else purpose or "rendergraph"
             found += [""] * bool(found) + [f"// {label}"]
         found.append(line)
-        last = Origin(origin.file, origin.line, made=made)
+        last = Origin(origin.file, origin.line, purpose=purpose)
         gap = False
     return "\n".join(found) + "\n"

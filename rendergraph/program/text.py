@@ -414,5 +414,5 @@ def _used_macros(macros: Mapping[str, str], text: str) -> dict[str, str]:
 
 def _macro_text(macros: Mapping[str, str]) -> SourceText:
     return SourceText.of(
-        (f"#define {key} {value}".rstrip(), Origin(made=f"the macro {key}")) for key, value in macros.items()
+        (f"#define {key} {value}".rstrip(), Origin(purpose=f"the macro {key}")) for key, value in macros.items()
     )

@@ -117,6 +117,6 @@ def _describe(linked: Linked, expansion: Expansion, steps: list[Step], step: Ste
 def _origins(text: Any) -> list[dict[str, Any]]:
     """File and line of each line; a line that rendergraph writes has no file, but the reason in `made`."""
     return [
-        {"file": str(one.file) if one.file is not None else None, "line": one.line, "made": one.made}
+        {"file": str(one.file) if one.file is not None else None, "line": one.line, "made": one.purpose}
         for one in text.source.origins
     ]

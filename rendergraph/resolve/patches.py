@@ -209,15 +209,15 @@ def _split(text: str) -> tuple[str, str | None]:
 def _value(text: str, source: Source) -> Value:
     if text.lstrip().startswith("#"):
         return Value(text, source)  # a colour, most likely; YAML would see a comment
-    return _moved(parse(text, source.origin).root, source)
+    return _with_source(parse(text, source.origin).root, source)
 
 
-def _moved(value: Value, source: Source) -> Value:
+def _with_source(value: Value, source: Source) -> Value:
     data = value.data
     if isinstance(data, dict):
-        data = {key: _moved(child, source) for key, child in data.items()}
+        data = {key: _with_source(child, source) for key, child in data.items()}
     elif isinstance(data, list):
-        data = [_moved(child, source) for child in data]
+        data = [_with_source(child, source) for child in data]
     return Value(data, source)
 
 

@@ -42,7 +42,7 @@ class Schedule(Struct, frozen=True, dict=True):
     """Steps culled and ordered.
 
     Attributes:
-        wanted: as in `Expansion`: output name to resource id.
+        outputs: as in `Expansion`: output name to resource id.
         culled: node id to the reason why none of its steps runs.
         peak_bytes: the most bytes of live resources at any step, in this order.
         least_peak_bytes: the least peak of any order found; this order's may be higher, as it allocates less.
@@ -57,7 +57,7 @@ class Schedule(Struct, frozen=True, dict=True):
 
     steps: tuple[Step, ...]
     resources: Mapping[str, Resource]
-    wanted: Mapping[str, str]
+    outputs: Mapping[str, str]
     culled: Mapping[str, str]
     peak_bytes: int
     peak_node: str | None
@@ -76,7 +76,7 @@ class Schedule(Struct, frozen=True, dict=True):
     @cached_property
     def shown(self) -> frozenset[str]:
         """Ids of the resources that keep their memory from their first write to the frame's end."""
-        return frozenset(self.wanted.values()) - self.whole_frame
+        return frozenset(self.outputs.values()) - self.whole_frame
 
     @cached_property
     def reasons(self) -> Mapping[StepKey, str]:
@@ -108,10 +108,10 @@ def schedule(
         text = f"the pipeline has {len(expansion.steps)} steps, more than {MOST_STEPS}; use fewer nodes or lower counts"
         raise InputError(Problem("RG606", text))
     versions = Versions.of(expansion.steps)
-    kept = contributing(expansion.steps, expansion.resources, expansion.wanted, versions, expansion.idle)
+    kept = contributing(expansion.steps, expansion.resources, expansion.outputs, versions, expansion.idle)
     touched = {read.resource for step in kept for read in step.all_reads}
     touched |= {write.resource for step in kept for write in step.writes}
-    shown = set(expansion.wanted.values())
+    shown = set(expansion.outputs.values())
     resources = {id: expansion.resources[id] for id in sorted(expansion.resources) if id in touched or id in shown}
     kept_versions = Versions.of(kept) if len(kept) < len(expansion.steps) else versions
     waits = dependencies(kept, kept_versions)
@@ -133,7 +133,7 @@ def schedule(
     return Schedule(
         steps=steps,
         resources=resources,
-        wanted=dict(expansion.wanted),
+        outputs=dict(expansion.outputs),
         culled={**culled_reasons(expansion.steps, kept, versions), **expansion.idle},
         peak_bytes=peak,
         peak_node=None if peak_step is None else model.steps[peak_step].node,
@@ -148,7 +148,7 @@ def schedule(
 
 def _sinks(expansion: Expansion, kept: Sequence[Step], versions: Versions) -> list[Step]:
     """Return the last writers of the outputs, by output name, then of what the next frame reads."""
-    ids = [expansion.wanted[name] for name in sorted(expansion.wanted)]
+    ids = [expansion.outputs[name] for name in sorted(expansion.outputs)]
     ids += sorted({read.resource for step in kept for read in step.all_reads if read.previous})
     finals = [versions.final(id) for id in ids]
     return [step for step in finals if step is not None]

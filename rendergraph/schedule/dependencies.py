@@ -89,7 +89,7 @@ def is_filled_by_update(id: str, resource: Resource, versions: Versions) -> bool
 def contributing(
     steps: Sequence[Step],
     resources: Mapping[str, Resource],
-    wanted: Mapping[str, str],
+    outputs: Mapping[str, str],
     versions: Versions,
     idle: Mapping[str, str],
 ) -> list[Step]:
@@ -100,7 +100,7 @@ def contributing(
     kept: set[StepKey] = set()
     problems: list[Problem] = []
     stack: list[Step] = []
-    for name, id in wanted.items():
+    for name, id in outputs.items():
         final = versions.final(id)
         if final is not None:
             stack.append(final)

@@ -112,7 +112,7 @@ class Drawing(Struct, eq=False, dict=True):
         """Read back the requested outputs of the last frame."""
         linked, plan = self.expanded.linked, self.executable.plan
         graph = linked.graph
-        resources = plan.schedule.wanted
+        resources = plan.schedule.outputs
         infos = {}
         for name, port in self.expanded.requests.items():
             infos[name] = _output_info(

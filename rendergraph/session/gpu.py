@@ -57,7 +57,7 @@ class Gpu:
         """Free everything, the context too unless it was borrowed; only the thread that created it may do so."""
         if self._closed:
             return
-        if os.getpid() != self._process or self.device.gone:  # all of it is the other process's, or gone
+        if os.getpid() != self._process or self.device.is_released:  # all of it is the other process's, or gone
             self._closed = True
             return
         if threading.get_ident() != self._thread:
@@ -84,7 +84,7 @@ class Gpu:
             text = "a session cannot be used after a fork; fork before OpenGL is used, or start new processes ('spawn')"
         elif threading.get_ident() != self._thread:
             text = "a session must be used by the thread that created it; create one per thread"
-        elif self.device.gone:
+        elif self.device.is_released:
             text = "the session's context has been released; keep it until the session is closed, or create another"
         if text:
             raise RenderError(Problem("RG615", text))

@@ -189,4 +189,4 @@ def _structure(expansion: Expansion) -> tuple[Any, ...]:
         for step in expansion.steps
     )
     resources = tuple(expansion.resources.values())
-    return steps, resources, tuple(expansion.wanted.items()), tuple(expansion.views.items())
+    return steps, resources, tuple(expansion.outputs.items()), tuple(expansion.views.items())

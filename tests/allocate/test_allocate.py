@@ -107,7 +107,7 @@ def test_buffers_share_where_they_are_of_one_size() -> None:
 
 
 def test_an_output_takes_what_is_free_and_keeps_it() -> None:
-    plan = allocate(replace(chain(RGBA8, RGBA8, RGBA8, RGBA8), wanted={"image": "n3.x", "first": "n1.x"}))
+    plan = allocate(replace(chain(RGBA8, RGBA8, RGBA8, RGBA8), outputs={"image": "n3.x", "first": "n1.x"}))
     assert members(plan) == [("n0.x", "n2.x"), ("n1.x",), ("n3.x",)]
     assert (plan.lifetimes["n1.x"].first, plan.lifetimes["n1.x"].last) == (1, 3)
     assert plan.released == {1: ("n0.x",), 3: ("n2.x",)}

@@ -101,7 +101,7 @@ def needed(expansion: Expansion) -> set[tuple[str, int]]:
         for step in expansion.steps
         for write in step.writes
     }
-    states = {(id, last[id]) for id in expansion.wanted.values()}
+    states = {(id, last[id]) for id in expansion.outputs.values()}
     keys: set[tuple[str, int]] = set()
     while True:
         before = len(states), len(keys)
@@ -162,7 +162,7 @@ def peak_of(steps: tuple[Step, ...], expansion: Expansion) -> int:
     for position, step in enumerate(steps):
         for id in ids_of(step):
             touches.setdefault(id, []).append(position)
-    shown = expansion.wanted.values()
+    shown = expansion.outputs.values()
     return max(
         sum(
             expansion.resources[id].desc.bytes * copies_of(steps, id, expansion)
@@ -188,7 +188,7 @@ def assert_valid(plan: ResourcePlan, *, alias: bool = True) -> None:
     holds: dict[int, tuple[str, int]] = {}
     newest: dict[str, int] = {}
     previous = {id for id, resource in resources.items() if resource.role == "history"}
-    shown = set(plan.schedule.wanted.values())
+    shown = set(plan.schedule.outputs.values())
     filled = {r.resource for step in steps for r in step.all_reads if r.version == 0 and not r.previous}
     for frame in range(3):  # history takes turns, so that a second and a third frame are part of it
         for name in filled:  # `update` writes these buffers before the frame, and what is the scene's is there
@@ -219,7 +219,7 @@ def assert_valid(plan: ResourcePlan, *, alias: bool = True) -> None:
             assert holds[plan.placement[id][frame % len(plan.placement[id])]][0] == id
     users: dict[int, list[str]] = {}
     for id, physicals in plan.placement.items():
-        base = Expansion(steps, resources, plan.schedule.wanted)
+        base = Expansion(steps, resources, plan.schedule.outputs)
         assert len(physicals) == (copies_of(steps, id, base) if alias else 1 + (id in previous))
         for physical in physicals:
             users.setdefault(physical, []).append(id)
@@ -367,7 +367,7 @@ def test_results_do_not_depend_on_the_order_of_nodes_and_keys(
     steps = tuple(step for node in nodes for step in base.steps if step.node == node)
     resources = list(base.resources.items())
     chooser.shuffle(resources)
-    wanted = list(base.wanted.items())
+    wanted = list(base.outputs.items())
     chooser.shuffle(wanted)
     other = Expansion(steps, dict(resources), dict(wanted))
     assert schedule(other) == schedule(base)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rendergraph.api import Depth, Node, Output, State, Steps, projection
-from rendergraph.compile.culling import seen
+from rendergraph.compile.culling import visible_objects
 from rendergraph.scene import pack
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.load import load
@@ -68,7 +68,7 @@ def test_nothing_that_a_view_sees_is_left_out_and_little_else_is_drawn(tmp_path:
     for camera in _cameras(30):
         view = view_matrices(camera, (32, 16))
         for clamped in (False, True):
-            found = seen(packed, view, clamped=clamped)
+            found = visible_objects(packed, view, clamped=clamped)
             for number, entry in enumerate(scene.objects):
                 low, high = np.asarray(scene.meshes[entry.mesh].box)
                 local = (low + high) / 2 + (high - low) / 2 * np.concatenate([CORNERS, points])

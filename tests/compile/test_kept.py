@@ -244,7 +244,7 @@ def test_kept_memory_is_in_the_plan(bench: Any) -> None:
     plan = bench.pipeline(TEXT, Table, Show, shaders=SHADERS).plan()
     assert plan.resources["a.table"].role == plan.resources["a.doubled"].role == "kept"
     lives = {id: (life.first, life.last) for id, life in plan.lifetimes.items()}
-    assert lives == {"a.table": (0, 2), "a.doubled": (0, 2), plan.schedule.wanted["image"]: (2, 2)}
+    assert lives == {"a.table": (0, 2), "a.doubled": (0, 2), plan.schedule.outputs["image"]: (2, 2)}
     assert plan.memory.allocated_bytes == 16 * 16 + 4 * 16 + 16 * 8 * 8
     assert plan.memory.lower_bound_bytes == plan.memory.allocated_bytes
     assert plan.reasons["a.table"].startswith("it outlives the frame")

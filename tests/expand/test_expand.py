@@ -98,7 +98,7 @@ def test_a_node_of_two_steps_reads_its_own_internal_in_the_second() -> None:
         "b.across": "internal",
         "b.blurred": "output",
     }
-    assert found.wanted == {"image": "b.blurred"}
+    assert found.outputs == {"image": "b.blurred"}
 
 
 def test_parameters_are_uniforms_and_defines_of_every_step_and_arguments_of_their_own() -> None:
@@ -142,7 +142,7 @@ def test_who_continues_a_texture_makes_its_next_version() -> None:
     assert reads["b", 0] == [("s.color", 1, "sample")]  # before the light is added
     assert reads["two", 0] == [("s.color", 2, "attach")]
     assert "one.color" not in found.resources
-    assert found.wanted["image"] == "s.color"
+    assert found.outputs["image"] == "s.color"
 
 
 def test_an_optional_continued_texture_that_is_not_connected_is_the_nodes_own() -> None:

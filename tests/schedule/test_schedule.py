@@ -394,7 +394,7 @@ def test_four_hundred_outputs_are_planned_in_two_seconds() -> None:
     ]
     base = expansion(*steps, sizes={f"a{n}.x": n % 50 + 1 for n in numbers})
     start = time.process_time()
-    found = schedule(replace(base, wanted={f"output{n}": f"b{n}.x" for n in numbers}))
+    found = schedule(replace(base, outputs={f"output{n}": f"b{n}.x" for n in numbers}))
     assert time.process_time() - start < 2
     assert found.proven
 
