@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import re
-import shutil
-import subprocess
 from collections.abc import Iterator
 
 import pytest
 
 import rendergraph as rg
-from rendergraph.program import StageText, positions_macro, stage_texts
+from rendergraph.program import StageText, stage_texts
 from rendergraph.program.scope import InScope, annotated, in_scope
 from rendergraph.program.variants import variants
-from rendergraph.resources import shipped_pipelines
 from rendergraph.scene.pack import pack
 from rendergraph.steps import Step
 
@@ -91,21 +88,3 @@ def test_variants_are_those_that_are_compiled(scene: str, gl: rg.Session) -> Non
     compiled = {text for key in gl.cache.programs._programs.keys() - before for text in key if isinstance(text, tuple)}
     told = {(stage, text.text) for _, _, texts, _ in programs(pipeline) for stage, text in texts.items()}
     assert {pair for pair in compiled if pair and pair[0] in ("vertex", "fragment")} <= told
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(shutil.which("glslangValidator") is None, reason="glslangValidator is not installed")
-@pytest.mark.parametrize("name", shipped_pipelines())
-def test_a_compiler_takes_every_text(name: str) -> None:
-    ends = {"vertex": "vert", "geometry": "geom", "fragment": "frag", "compute": "comp"}
-    texts = {
-        (ends[stage], annotated(text)) for _, _, texts, _ in programs(rg.load(name)) for stage, text in texts.items()
-    }
-    assert texts
-    for end, text in texts:
-        for samples in (2, 4, 8, 16):  # the device says where they lie; any places do for a compiler
-            text = text.replace(positions_macro(samples) + "\n", f"vec2[]({', '.join(['vec2(0.5)'] * samples)})\n")
-        answer = subprocess.run(
-            ["glslangValidator", "--stdin", "-S", end], input=text, text=True, capture_output=True, check=False
-        )
-        assert answer.returncode == 0, answer.stdout
