@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import logging
 import pickle
 import queue
 import shutil
@@ -40,6 +41,7 @@ _WORKER_LEAVES = (OSError, KeyError, ValueError)
 
 
 def start_local_cluster(count: int, devices: Sequence[int | None], *, timeout: float) -> Dask:
+    _silence_logs()
     # Its workers are threads of this process, and each has a process of its own by its `WorkerSetup`: Dask's way of
     # starting processes would run the caller's script once more.
     cluster = _distributed.LocalCluster(
@@ -47,7 +49,7 @@ def start_local_cluster(count: int, devices: Sequence[int | None], *, timeout: f
         threads_per_worker=1,
         processes=False,
         dashboard_address=None,
-        silence_logs=50,
+        silence_logs=logging.CRITICAL,
         scheduler_kwargs={"dashboard_address": ":0"},  # it serves status anyway; any port that is free
     )
     return Dask(_distributed.Client(cluster, set_as_default=False), devices, timeout=timeout, cluster=cluster)
@@ -60,6 +62,7 @@ def connect(choice: Any, device: int | None, *, timeout: float) -> Dask:
     if not isinstance(choice, str):
         text = f"expected an executor's name, an Executor or a Dask Client, got {type(choice).__name__}"
         raise UsageError(Problem("RG641", text))
+    _silence_logs()
     address = choice.removeprefix("dask://")
     try:
         client = _distributed.Client(f"tcp://{address}", timeout=CONNECT_SECONDS, set_as_default=False)
@@ -71,6 +74,12 @@ def connect(choice: Any, device: int | None, *, timeout: float) -> Dask:
         text = f"the Dask scheduler at {address} has no workers; start some: dask worker {address}"
         raise RenderError(Problem("RG641", text))
     return Dask(client, (device,), timeout=timeout, owned=True)
+
+
+def _silence_logs() -> None:
+    """Let Dask print critical errors only; its own `silence_logs` ends with the cluster, before connections do."""
+    for handler in logging.getLogger("distributed").handlers:
+        handler.setLevel(logging.CRITICAL)
 
 
 def _workers(client: Client) -> dict[str, Any]:
@@ -305,11 +314,11 @@ class WorkerSetup(WorkerPlugin):
                 self._process.send(
                     pickle.loads(task), values, bundle.environment(root), root=str(root), home=bundle.home
                 )
-                while not messages or messages[-1][0] == "item":
+                while not messages or messages[-1][0] in ("ready", "item"):
                     messages.append(self._process.receive())
             except RendergraphError as error:
                 messages.append(("lost", error))
-            return messages
+            return [message for message in messages if message[0] != "ready"]
 
     def _write(self, bundle: Bundle, root: Path, files: Mapping[str, bytes]) -> None:
         for digest, content in files.items():

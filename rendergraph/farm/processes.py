@@ -74,6 +74,8 @@ class Processes(Executor):
             if not self._busy and not self._idle:
                 raise error
         else:
+            if kind == "ready":
+                return
             if kind == "item":
                 yield TaskOutput(self._busy[worker], value, worker.name)
             elif kind == "failed" and is_retryable(value):

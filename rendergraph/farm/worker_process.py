@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 TIMEOUT = 600.0
 """Seconds without a message before a worker is replaced."""
-STARTUP_TIMEOUT = 120.0
-"""Seconds until the first message, at least: the process starts, imports, opens its device, and compiles."""
+STARTUP_TIMEOUT = 30.0
+"""Seconds until a worker is ready: the process starts, imports and opens its device, which takes about a second."""
 _PR_SET_PDEATHSIG = 1
 
 
@@ -63,10 +63,7 @@ class ChildProcess:
                 env={**os.environ, **(environment or {})},
             )
         self.pipe = Connection(local.detach())
-        self._has_answered = False
-
-    def patience(self, timeout: float) -> float:
-        return timeout if self._has_answered else max(timeout, STARTUP_TIMEOUT)
+        self.has_answered = False
 
     def receive(self, timeout: float) -> Any:
         """Wait for the next message; TimeoutError if none came in time.
@@ -81,7 +78,7 @@ class ChildProcess:
             raise
         except (EOFError, OSError):
             raise EOFError(self.exit_reason()) from None
-        self._has_answered = True
+        self.has_answered = True
         return message
 
     def exit_reason(self) -> str:
@@ -116,6 +113,7 @@ class WorkerProcess:
         self.child: ChildProcess | None = None
         self._device, self._timeout = device, timeout
         self._stored: set[str] = set()
+        self._unsent: list[tuple[Any, ...]] = []
         self._heard = 0.0
 
     def send(
@@ -134,40 +132,48 @@ class WorkerProcess:
             self.child = ChildProcess("rendergraph.farm.worker_process:run_tasks", arguments, environment)
             self._stored = set()
         self._heard = time.monotonic()
+        self._unsent = [("store", new, pickle.loads(values[new])) for new in values.keys() - self._stored]
+        self._unsent.append(("run", task))
+        self._stored |= values.keys()
+        if self.child.has_answered:  # what is sent to a process that reads nothing yet may wait for ever
+            self._send_all(self.child)
+
+    def _send_all(self, child: ChildProcess) -> None:
         try:
-            for digest in values.keys() - self._stored:
-                self.child.pipe.send(("store", digest, pickle.loads(values[digest])))
-            self._stored |= values.keys()
-            self.child.pipe.send(("run", task))
+            for message in self._unsent:
+                child.pipe.send(message)
         except OSError:
-            raise self._loss_error(self.child.exit_reason()) from None
+            raise self._loss_error(child.exit_reason()) from None
 
     @property
     def seconds_left(self) -> float:
         assert self.child is not None
-        return max(0.0, self._heard + self.child.patience(self._timeout) - time.monotonic())
+        patience = self._timeout if self.child.has_answered else STARTUP_TIMEOUT
+        return max(0.0, self._heard + patience - time.monotonic())
 
     def receive(self) -> tuple[str, Any]:
-        """Wait for the next message about the task: `(item, value)`, `(finished, seconds)` or `(failed, error)`.
+        """Wait for the next message: `(ready, device)`, `(item, value)`, `(finished, seconds)` or `(failed, error)`.
 
         A RenderError says that the process has ended or was terminated, a DeviceError that it has no usable GL device.
         """
         assert self.child is not None
-        while True:
-            try:
-                kind, value = self.child.receive(self.seconds_left)
-            except TimeoutError:
-                text = f"timed out after {self._timeout:g} s without progress and was terminated"
-                self.kill()
-                raise RenderError(Problem("RG640", f"worker '{self.name}' {text}; --timeout allows more")) from None
-            except EOFError as error:
-                raise self._loss_error(str(error)) from None
-            self._heard = time.monotonic()
-            if kind == "unable":
-                self.kill()
-                raise value
-            if kind != "ready":
-                return kind, value
+        try:
+            kind, value = self.child.receive(self.seconds_left)
+        except TimeoutError:
+            text = f"did not start within {STARTUP_TIMEOUT:g} s and was terminated"
+            if self.child.has_answered:
+                text = f"timed out after {self._timeout:g} s without progress and was terminated; --timeout allows more"
+            self.kill()
+            raise RenderError(Problem("RG640", f"worker '{self.name}' {text}")) from None
+        except EOFError as error:
+            raise self._loss_error(str(error)) from None
+        self._heard = time.monotonic()
+        if kind == "unable":
+            self.kill()
+            raise value
+        if kind == "ready":
+            self._send_all(self.child)
+        return kind, value
 
     def _loss_error(self, reason: str) -> RenderError:
         self.kill()

@@ -18,6 +18,10 @@ TIMEOUT = 30.0
 """Seconds that a request may take; the first one of a process may take longer."""
 
 
+FIRST_TIMEOUT = 120.0
+"""Seconds that the first request of a process may take, at least: it also imports, opens the device, and compiles."""
+
+
 class RenderProcess:
     """A process that answers requests, one at a time. Any one thread at a time may use it."""
 
@@ -41,7 +45,7 @@ class RenderProcess:
         """
         with self._lock:
             child = self._running()
-            patience = child.patience(self._timeout)
+            patience = self._timeout if child.has_answered else max(self._timeout, FIRST_TIMEOUT)
             try:
                 with contextlib.suppress(OSError):  # receiving finds out why
                     child.pipe.send(request)

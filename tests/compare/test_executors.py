@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import json
+import logging
 import os
 import resource
 import signal
@@ -403,6 +405,15 @@ def test_what_a_worker_does_not_get_as_it_goes_is_sent_to_others(
         farm.put("what is needed")
     assert len(sent) == 2
     assert sent[0] == sent[1]
+
+
+def test_what_dask_logs_after_the_end_of_its_cluster_is_not_printed(monkeypatch: pytest.MonkeyPatch) -> None:
+    printed = io.StringIO()
+    monkeypatch.setattr(logging.getLogger("distributed"), "handlers", [logging.StreamHandler(printed)])
+    with dask_cluster.start_local_cluster(1, (), timeout=60.0):
+        pass
+    logging.getLogger("distributed.batched").error("Batched Comm Closed")
+    assert printed.getvalue() == ""
 
 
 HALO = '''"""A node of an installed plugin."""

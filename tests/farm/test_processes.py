@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from rendergraph.errors import DeviceError, UsageError
-from rendergraph.farm import Serial, TaskFailed, TaskFinished, TaskOutput, TaskRetried
+from rendergraph.farm import Serial, TaskFailed, TaskFinished, TaskOutput, TaskRetried, worker_process
 from rendergraph.farm.executors import make_executor
 from rendergraph.farm.processes import Processes
 
@@ -23,6 +23,21 @@ Chores = Callable[..., Any]
 
 def of(events: list[Any], name: str) -> list[type]:
     return [type(event) for event in events if event.task.name == name]
+
+
+def test_a_process_that_hangs_before_it_reads_is_given_up(
+    chore: Chores, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "sitecustomize.py").write_text("import time\n\ntime.sleep(60)\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(worker_process, "STARTUP_TIMEOUT", 0.3)
+    begun = time.monotonic()
+    with Processes(1) as farm:
+        farm.submit(chore("any", needs=(farm.put(bytes(1 << 22)),)))  # more than a pipe takes that nobody reads
+        retried, failed = farm.events()
+    assert (type(retried), type(failed)) == (TaskRetried, TaskFailed)
+    assert "worker 'process-0' did not start within 0.3 s and was terminated" in str(failed.error)
+    assert time.monotonic() - begun < 20
 
 
 @pytest.mark.slow
