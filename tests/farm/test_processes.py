@@ -35,7 +35,8 @@ def test_a_process_that_hangs_before_it_reads_is_given_up(
     with Processes(1) as farm:
         farm.submit(chore("any", needs=(farm.put(bytes(1 << 22)),)))  # more than a pipe takes that nobody reads
         retried, failed = farm.events()
-    assert (type(retried), type(failed)) == (TaskRetried, TaskFailed)
+    assert isinstance(retried, TaskRetried)
+    assert isinstance(failed, TaskFailed)
     assert "worker 'process-0' did not start within 0.3 s and was terminated" in str(failed.error)
     assert time.monotonic() - begun < 20
 
