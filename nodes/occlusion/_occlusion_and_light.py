@@ -16,9 +16,11 @@ class OcclusionAndLight(Interreflection):
     light themselves, and that of the lighting node must be 0.
     """
 
-    occlusion = Output(Occlusion, format="r16", size="depth", doc="1 open, 0 closed; 1 where nothing is.")
+    occlusion = Output(
+        Occlusion, format="r16", size="depth", doc="Ambient visibility: 1 open, 0 occluded; 1 for background."
+    )
 
-    wider: float = param(default=5.0, min=1, max=100, doc="Light comes from this many times the radius.")
+    wider: float = param(default=5.0, min=1, max=100, doc="Radius of light, as a multiple of that of occlusion.")
     ambient: float | tuple[float, float, float] = param(
         default=0.03, min=0, glsl="vec3", doc="Radiance from all sides, a number or RGB, scaled by the occlusion."
     )

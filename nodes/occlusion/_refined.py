@@ -27,10 +27,10 @@ class RefinedOcclusion(ScreenSpaceOcclusion):
         default=0.5,
         min=0.125,
         max=1,
-        doc="Share of the picture's width and height it is computed at, where `refine` does not ask for all.",
+        doc="Resolution relative to the picture's width and height; `refine` adds pixels at full size.",
     )
     refine: bool = structural(
-        default=True, doc="At a reduced size, compute all pixels that reduced ones say too little about."
+        default=True, doc="At a reduced size, compute pixels at full size where interpolation is not enough."
     )
 
     def refines(self, steps: Steps) -> bool:

@@ -38,13 +38,17 @@ class ScreenSpaceOcclusion(Node):
 
     depth = Input(Depth, doc="Window depth; positions come from it and its view.")
     normal = Input(Normal, doc="Unit normal, world space.")
-    occlusion = Output(Occlusion, format="r16", size="depth", doc="1 open, 0 closed; 1 where nothing is.")
+    occlusion = Output(
+        Occlusion, format="r16", size="depth", doc="Ambient visibility: 1 open, 0 occluded; 1 for background."
+    )
     surfaces = Internal(format="rgba32f", size=reduced_size, view="depth")
     unfiltered = Internal(format="r16", size=reduced_size)
 
-    radius: float = param(default=0.5, unit="m", min=1e-6, max=1e6, doc="Nothing farther away than this occludes.")
+    radius: float = param(
+        default=0.5, unit="m", min=1e-6, max=1e6, doc="Surfaces farther away than this do not occlude."
+    )
     scale: float = structural(
-        default=1.0, min=0.125, max=1, doc="Share of the picture's width and height it is computed at."
+        default=1.0, min=0.125, max=1, doc="Resolution relative to the picture's width and height."
     )
 
     def screen_size(self, steps: Steps) -> tuple[int, int]:
