@@ -65,10 +65,6 @@ metric_option = click.option(
     shell_complete=options.offered("ports"),
     help="Measure this port's texture instead of the picture.",
 )
-title_option = click.option("--title", default="", metavar="TEXT", help="Report title.")
-note_option = click.option(
-    "--note", default="", metavar="TEXT", help="Text beneath the title; empty lines separate paragraphs."
-)
 at_option = click.option(
     "--at",
     "frame",
@@ -77,13 +73,21 @@ at_option = click.option(
     show_default=True,
     help="Compare pictures of this frame.",
 )
-threshold_option = click.option(
-    "--fail-above",
-    "thresholds",
-    multiple=True,
-    type=options.Parsed("METRIC=NUMBER", _threshold),
-    help="Exit with code 4 if a metric exceeds this value: flip=0.02.",
+report_options = options.together(
+    click.option(
+        "--fail-above",
+        "thresholds",
+        multiple=True,
+        type=options.Parsed("METRIC=NUMBER", _threshold),
+        help="Exit with code 4 if a metric exceeds this value: flip=0.02.",
+    ),
+    click.option("--title", default="", metavar="TEXT", help="Report title."),
+    click.option("--note", default="", metavar="TEXT", help="Text beneath the title; empty lines separate paragraphs."),
+    options.executor_options,
+    options.json_option,
+    options.device_option,
 )
+"""The last options of `compare` and `sweep`."""
 
 
 @click.command("compare", no_args_is_help=True)
@@ -102,12 +106,7 @@ threshold_option = click.option(
 @click.option("-n", "--frames", type=click.IntRange(1, 10_000), default=10, show_default=True, help="Measured frames.")
 @at_option
 @click.option("-o", "--output", type=options.NamedPath(dir_okay=False), metavar="FILE", help="Write a report, HTML.")
-@threshold_option
-@title_option
-@note_option
-@options.executor_options
-@options.json_option
-@options.device_option
+@report_options
 @options.draw_timeout_option
 def command(
     pipelines: tuple[str, ...],

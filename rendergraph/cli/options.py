@@ -178,7 +178,7 @@ def offered(kind: str) -> Callable[[click.Context, click.Parameter, str], list[A
     return complete
 
 
-def _all(*decorators: Callable[[Any], Any]) -> Callable[[F], F]:
+def together(*decorators: Callable[[Any], Any]) -> Callable[[F], F]:
     """Return one decorator for several, in the order of `--help`."""
 
     def decorate(function: F) -> F:
@@ -220,7 +220,7 @@ scene_option = click.option(
     shell_complete=offered("scenes"),
     help="Scene to render: a shipped name, a scene file, .obj, .gltf, .glb.",
 )
-executor_options = _all(
+executor_options = together(
     click.option(
         "--executor",
         type=EXECUTOR,
@@ -296,7 +296,7 @@ def selection_options(function: F) -> F:
         fields = {name: given.pop(name) for name in SELECTION_OPTIONS}
         function(select=lambda name: Selection("/dev/stdin" if name == "-" else name, **fields), **given)
 
-    return _all(*SELECTION_OPTIONS.values())(selecting)  # type: ignore[return-value]
+    return together(*SELECTION_OPTIONS.values())(selecting)  # type: ignore[return-value]
 
 
 # --- what verbs do with them -----------------------------------------------------------------------------------------

@@ -83,12 +83,7 @@ def _group(text: str) -> tuple[str, ...]:
     "--repeats", type=click.IntRange(1, 1000), metavar="N", help="Measure N times, and report the spread.  [default: 1]"
 )
 @shared.at_option
-@shared.threshold_option
-@shared.title_option
-@shared.note_option
-@options.executor_options
-@options.json_option
-@options.device_option
+@shared.report_options
 def command(
     pipeline: str,
     axes: tuple[Axis, ...],

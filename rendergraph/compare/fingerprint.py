@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.errors import InputError
+from rendergraph.farm.bundle import file_sha256
 from rendergraph.program import stage_texts, text_key
 from rendergraph.stamps import FileCache, record_read
 from rendergraph.version import __version__
@@ -66,8 +67,7 @@ def file_digest(path: Path) -> str:
 def _read_digest(path: Path) -> str:
     record_read(path)
     try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+        return file_sha256(path)
     except OSError:
         return ""
 

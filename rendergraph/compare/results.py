@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from rendergraph.session.values import Planned
 
 Pixels = npt.NDArray[Any]
-_MOST_NOTEBOOK_PICTURES = 6
 K = TypeVar("K", bound=Hashable)
 
 
@@ -226,26 +225,9 @@ class Comparison:
         return f"<Comparison on {self.scene}, {width}×{height}, FLIP against {self.reference.name}: {errors}{more}>"
 
     def _repr_html_(self) -> str:
-        from rendergraph.compare.report.html import SOFTWARE, eight_bit, notebook_html, number  # for notebooks alone
-        from rendergraph.images import heat_map  # likewise
+        from rendergraph.compare.report import notebook_html  # for notebooks alone
 
-        reference, pictures = self.reference, []
-        if reference.kind != "variant":
-            pictures.append((f"{reference.name}, the reference", eight_bit(reference.pixels, reference.encoding)))
-        for result in [result for result in self.results if result.pixels is not None][:_MOST_NOTEBOOK_PICTURES]:
-            assert result.pixels is not None
-            pictures.append((result.name, eight_bit(result.pixels, result.encoding)))
-            if result.flip_map is not None:
-                pictures.append((f"FLIP of {result.name}: {number(result.metrics.flip)}", heat_map(result.flip_map)))
-        times = "GPU ms" if all(result.times.gpu_ms for result in self.results) else "ms"
-        rows: list[tuple[str, ...]] = [("", "FLIP", "RMSE", "PSNR dB", "SSIM", times)]
-        for result in self.results:
-            m, ms = result.metrics, number(result.times.headline.median, 2)
-            psnr = "∞" if m.psnr is None else number(m.psnr, 2)
-            rows.append((result.name, number(m.flip), number(m.rmse), psnr, number(m.ssim), ms))
-        scene = f"{self.scene}, " if self.scene else ""
-        about = f"{scene}{self.size[0]}×{self.size[1]}, against {reference.name}"
-        return notebook_html(pictures, rows, about + (f"; {SOFTWARE}" if self.software else ""))
+        return notebook_html(self)
 
     @property
     def software(self) -> bool:

@@ -88,24 +88,3 @@ def section(identity: str, title: str, *parts: str) -> tuple[str, str]:
     head = f'<h2 id="{identity}-title">{escape(title)}</h2>'
     html = f'<section id="{identity}" aria-labelledby="{identity}-title">{head}\n{body}\n</section>'
     return f'<a href="#{identity}">{escape(title)}</a>', html
-
-
-def notebook_html(
-    pictures: Sequence[tuple[str, npt.NDArray[np.uint8]]], rows: Sequence[Sequence[str]], about: str
-) -> str:
-    """Return pictures with captions above a table, whose first row has the headings, and a line of text.
-
-    Styles are inline, because the page of a notebook has its own.
-    """
-    figures = "".join(
-        f'<figure style="margin:0;max-width:320px"><img src="{png(pixels)}" alt="{escape(caption)}" '
-        f'style="width:100%;border:1px solid #7d8590"><figcaption>{escape(caption)}</figcaption></figure>'
-        for caption, pixels in pictures
-    )
-    lines = []
-    for row, cell in zip(rows, ("th", *("td",) * len(rows)), strict=False):
-        lines.append(f"<tr>{''.join(f'<{cell}>{escape(text)}</{cell}>' for text in row)}</tr>")
-    return (
-        f'<div style="display:flex;flex-wrap:wrap;gap:12px">{figures}</div>'
-        f"<table>{''.join(lines)}</table><div>{escape(about)}</div>"
-    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from html import escape
 
@@ -27,6 +28,12 @@ from rendergraph.resources import folder
 
 MOST_COLUMNS = 8
 """Maximum number of variants whose passes are compared side by side; of more, those on the front."""
+_MOST_NOTEBOOK_PICTURES = 6
+_NOTEBOOK_STYLE = """
+.rendergraph .sheet{display:flex;flex-wrap:wrap;gap:12px}.rendergraph figure{margin:0;max-width:320px}
+.rendergraph img{width:100%;border:1px solid #7d8590}.rendergraph .spread{display:block;opacity:.7}
+.rendergraph .bar{display:none}
+"""
 
 
 def comparison_page(comparison: Comparison, command: str, *, title: str = "", note: str = "") -> str:
@@ -77,6 +84,17 @@ def sweep_page(sweep: Sweep, command: str, *, title: str = "", note: str = "") -
         section("memory", "Memory", _memory(best)),
     ]
     return _page(title or f"Sweep of {comparison.results[0].source}", note, comparison, sections, command)
+
+
+def notebook_html(comparison: Comparison) -> str:
+    """Return the first pictures and the summary for a notebook, whose page has styles of its own."""
+    results, (width, height) = comparison.results, comparison.size
+    shown = [result for result in results if result.pixels is not None][:_MOST_NOTEBOOK_PICTURES]
+    pictures = sheet(replace(comparison, results=tuple(shown)), _MOST_NOTEBOOK_PICTURES)
+    plain = replace(comparison, results=tuple(replace(result, pixels=None) for result in results))  # without buttons
+    about = ", ".join(filter(None, (comparison.scene, f"{width}×{height}")))
+    summary = f"{_summary(plain, ())}<p>{escape(about)}</p>{software_note(comparison.software)}"
+    return f'<div class="rendergraph"><style>{_NOTEBOOK_STYLE}</style>{pictures}{summary}</div>'
 
 
 def _search(search: Search) -> str:
