@@ -77,8 +77,8 @@ class DirectionalSampling(ScreenSpaceOcclusion):
         passes: list[tuple[str, dict[str, Any]]] = [(mean, {"unfiltered": odd})]
         for number in range(denoise_passes):
             source = odd if number % 2 else even
-            values = {"source": source, "stride": 2 << number, "tolerance": self.plane_tolerance()}
-            passes.append(("atrous.frag", values))
+            inputs = {"source": source, "stride": 2 << number, "tolerance": self.plane_tolerance()}
+            passes.append(("atrous.frag", inputs))
         for number, (shader, values) in enumerate(passes):
             is_last = number == denoise_passes and not size_defines
             flags = {"FINAL": is_last, "KEEP_VISIBILITY": number > 0}
