@@ -213,7 +213,9 @@ class Runner(Struct, eq=False):
         updates: dict[str, float] = {}
         for node in self._updating:
             before = perf_counter()
-            self._update(node, index, time, camera, self._scene)
+            frame = FrameContext(executable, self.graph, node, index, time, camera, self._scene)
+            with _author_errors(node, "update"):
+                node.node.update(frame)  # pyright: ignore[reportArgumentType]  # a cached_property is one to mypy
             updates[node.id] = perf_counter() - before
         stale = {key: values for key, values in executable.uploads.items() if values.is_stale}
         for key, values in stale.items():
@@ -281,11 +283,6 @@ class Runner(Struct, eq=False):
         for call in self.executable.statics:
             call()
         self.executable.fresh = False
-
-    def _update(self, node: GraphNode, index: int, time: float, camera: ViewMatrices, scene: FrameScene) -> None:
-        with _author_errors(node, "update"):
-            frame = FrameContext(self.executable, self.graph, node, index, time, camera, scene)
-            node.node.update(frame)  # pyright: ignore[reportArgumentType]  # a cached_property is a property to mypy
 
     def _count_still(self, scene: Scene, camera: ViewMatrices) -> None:
         """How many frames nothing has moved: neither scene nor camera, nor a parameter that was changed meanwhile."""

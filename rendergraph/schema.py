@@ -45,11 +45,12 @@ def schema(catalog: Catalog, bases: Mapping[str, Mapping[str, str]] = {}) -> Sch
     """
     types: dict[str, type[Node] | None] = dict.fromkeys(catalog.names())
     types |= {found.name: found.cls for found in catalog.usable()[0]}
-    rules: dict[str, Schema] = {
-        name: {"properties": {"inputs": _inputs(name, cls), "params": _params(name, cls, catalog.extensions)}}
-        for name, cls in types.items()
-        if cls is not None
-    }
+    rules: dict[str, Schema] = {}
+    for name, cls in types.items():
+        if cls is not None:
+            own = {param: _param(one, catalog.extensions) for param, one in cls.parameters().items()}
+            params = _known_names(own, f"'{name}' has no such param.")
+            rules[name] = {"properties": {"inputs": _inputs(name, cls), "params": params}}
     found = file_schema(PIPELINE)
     found["properties"]["nodes"]["additionalProperties"] = {"$ref": "#/definitions/node"}
     found["definitions"] = {"node": _node(types, rules)}
@@ -144,11 +145,6 @@ def _port_type(port: Port) -> str:
     if getattr(port, "optional", False):
         words.append("optional")
     return ", ".join(words)
-
-
-def _params(type_name: str, cls: type[Node], extensions: Extensions) -> Schema:
-    own = {name: _param(one, extensions) for name, one in cls.parameters().items()}
-    return _known_names(own, f"'{type_name}' has no such param.")
 
 
 def _param(parameter: Parameter, extensions: Extensions) -> Schema:

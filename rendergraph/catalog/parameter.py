@@ -6,6 +6,8 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from typing import Any, Literal
 
+from msgspec import Struct
+
 from rendergraph.declare import Parameter
 from rendergraph.document import Value
 from rendergraph.errors import suggestion
@@ -23,20 +25,18 @@ def uniform_names(declared: Iterable[Global]) -> list[str]:
     ]
 
 
-class ParameterReader:
-    def __init__(
-        self, name: str, entry: Mapping[str, Value], named: Value | None, found: Global | None, report: Report
-    ) -> None:
-        """Take the keys of the header, the entry's value, the declaration, and what reports code and text.
+class ParameterReader(Struct, eq=False):
+    """The keys of the header, the entry's value, the declaration, and what reports code and text.
 
-        `report` is given the value of the header that is wrong, None for the declaration.
-        """
-        self.name = name
-        self.entry = entry
-        self.named = named
-        self.found = found
-        self.report = report
-        self.lacks_range = False
+    `report` is given the value of the header that is wrong, None for the declaration.
+    """
+
+    name: str
+    entry: Mapping[str, Value]
+    named: Value | None
+    found: Global | None
+    report: Report
+    lacks_range: bool = False
 
     def parameter(self, uniforms: Sequence[str], words: Callable[[], Set[str]]) -> Parameter | None:
         """Return the parameter, None if it is wrong."""

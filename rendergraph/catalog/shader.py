@@ -120,17 +120,14 @@ def _compute(entries: Entries) -> Record:
 
 def _local_size(entries: Entries, name: str) -> int:
     words = entries.globals.input_layout.get(name)
-    if words is None:
-        return 1
     try:
-        value = entries.globals.number(words)
+        value = entries.globals.number(words) if words is not None else 1
     except ValueError as error:
         entries.report("RG443", f"{name}: {error}")
         return 1
-    if 1 <= value <= 1024:
-        return value
-    entries.report("RG443", f"{name}: expected a whole number from 1 to 1024, got {value}")
-    return 1
+    if not 1 <= value <= 1024:
+        entries.report("RG443", f"{name}: expected a whole number from 1 to 1024, got {value}")
+    return value
 
 
 def _threads(entries: Entries) -> Threads:

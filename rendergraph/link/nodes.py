@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from msgspec import Struct, field
@@ -245,7 +245,8 @@ def _stand_ins(draft: UnlinkedNode, port: str, references: References) -> Iterat
     like = [made.name] if made.name in draft.inputs else []
     kind = getattr(made, "kind", "function")
     same = [name for name, one in draft.inputs.items() if one.kind == kind and meaning and one.semantic == meaning]
-    yield from _single_links(draft.links[name] for name in [*like, *same])
+    single = [draft.links[name][0] for name in [*like, *same] if len(draft.links[name]) == 1]
+    yield from sorted(single, key=lambda link: link.source.previous)  # those to last frame's values last
     scope = draft.spec.scope
     while scope and (found := references.spec.scopes[scope]).disabled is not None:
         for name, declared in found.inputs.items():
@@ -263,9 +264,3 @@ def _meaning(draft: UnlinkedNode, port: Port) -> Port:
     while isinstance(port, WrittenPort) and not isinstance(port, InOut) and port.semantic is None and port.like:
         port = draft.ports[port.like]
     return port
-
-
-def _single_links(inputs: Iterable[list[Link]]) -> Iterator[Link]:
-    """Links that are their input's only one; those to last frame's values last."""
-    found = [links[0] for links in inputs if len(links) == 1]
-    yield from sorted(found, key=lambda link: link.source.previous)

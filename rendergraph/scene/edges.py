@@ -75,7 +75,7 @@ def find_edges(positions: Floats, triangles: npt.NDArray[np.integer]) -> Edges:
     torn = np.flatnonzero(twice | (ranked[found] != back))
     if len(torn):
         first = int(torn[0])
-        a, b = (_shown(positions[vertex]) for vertex in (start[first], stop[first]))
+        a, b = ("({:g}, {:g}, {:g})".format(*positions[vertex].tolist()) for vertex in (start[first], stop[first]))
         forth_and_back = int((forth == forth[first]).sum()), int((forth == back[first]).sum())
         meet = {(1, 0): "only one triangle has", (2, 0): "two triangles turn the same way round at"}.get(
             forth_and_back, f"{sum(forth_and_back)} triangles share"
@@ -107,7 +107,3 @@ def _places(positions: Floats) -> tuple[Indices, int]:
     place = np.empty(len(order), np.int64)
     place[order] = np.cumsum(new) - 1
     return place, int(new.sum())
-
-
-def _shown(position: Floats) -> str:
-    return "({:g}, {:g}, {:g})".format(*(float(value) for value in position))

@@ -131,7 +131,7 @@ class _Block:
         if not block.endswith(b"\n"):
             block += b"\n"
         if b"#" in block:
-            block = _without_comments(block)
+            block = _COMMENT.sub(lambda comment: b" " * len(comment[0]), block)
         self.block = block
         self.bytes: Bytes = np.frombuffer(block, np.uint8)
         ends = np.flatnonzero(self.bytes == 10)
@@ -366,8 +366,3 @@ class _Block:
                 parsed.current[1] = 0
             table.append(list(parsed.current))
         return np.array(table, np.int64)[np.searchsorted(changes, faces)]
-
-
-def _without_comments(block: bytes) -> bytes:
-    """Blank every `#` that starts a word, up to the line's end."""
-    return _COMMENT.sub(lambda comment: b" " * len(comment[0]), block)
