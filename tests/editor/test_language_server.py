@@ -382,13 +382,16 @@ def test_scenes_are_completed_and_checked(editor: Editor, desk: Path) -> None:
 @pytest.mark.parametrize(
     ("at", "shown"),
     [
-        ("|taps", "Tests along a side: 4 means 4×4, 1 is the plain hard shadow.\n\nDefault 3, from 1 to 16. "),
+        ("|taps", "Tests along a side: 4 means 4×4, 1 is a hard shadow.\n\nDefault 3, from 1 to 16. "),
         (
             "|ambient",
-            "Radiance from all sides, a number or RGB; an environment takes its place.\n\nDefault 0.03, from 0 up. ",
+            "Constant ambient radiance, a number or RGB; an environment replaces it.\n\nDefault 0.03, from 0 up. ",
         ),
-        ("|shadow_pcf", "Shadows from a map by percentage-closer filtering.\n\nThe mean of N×N depth tests"),
-        ("{|shadow_map: sun", "Depth as the lights see it. (shadow\\_map, texture2d\\_array)"),
+        (
+            "|shadow_pcf",
+            "Filter the results of depth tests: percentage-closer filtering.\n\nThe visibility is the mean",
+        ),
+        ("{|shadow_map: sun", "Depth from the lights. (shadow\\_map, texture2d\\_array)"),
         ("|size", "Width and height in pixels."),
         ("|outputs", "Output name to `node.port`."),
     ],
