@@ -107,7 +107,6 @@ report_options = options.together(
 @at_option
 @click.option("-o", "--output", type=options.NamedPath(dir_okay=False), metavar="FILE", help="Write a report, HTML.")
 @report_options
-@options.draw_timeout_option
 def command(
     pipelines: tuple[str, ...],
     withs: tuple[tuple[str, ...], ...],

@@ -199,6 +199,15 @@ plugin_option = click.option(
 )
 
 
+device_option = click.option("--device", metavar="NUMBER", type=int, help="GL device, as `doctor` numbers them.")
+scene_option = click.option(
+    "--scene",
+    metavar="FILE",
+    shell_complete=offered("scenes"),
+    help="Scene to render: a shipped name, a scene file, .obj, .gltf, .glb.",
+)
+
+
 def _limit_draws(ctx: click.Context, param: click.Parameter, value: float | None) -> None:
     os.environ.pop(DRAW_TIMEOUT, None)
     if value is not None:
@@ -212,13 +221,6 @@ draw_timeout_option = click.option(
     expose_value=False,
     callback=_limit_draws,
     help="Exit with code 1 if drawing a frame takes longer, and name the step.",
-)
-device_option = click.option("--device", metavar="NUMBER", type=int, help="GL device, as `doctor` numbers them.")
-scene_option = click.option(
-    "--scene",
-    metavar="FILE",
-    shell_complete=offered("scenes"),
-    help="Scene to render: a shipped name, a scene file, .obj, .gltf, .glb.",
 )
 executor_options = together(
     click.option(
@@ -234,6 +236,7 @@ executor_options = together(
         metavar="SECONDS",
         help="Seconds without progress before a worker is replaced.  [default: 600]",
     ),
+    draw_timeout_option,
 )
 """The verb gets `executor`, `devices` and `timeout`."""
 SELECTION_OPTIONS = {

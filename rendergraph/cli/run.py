@@ -47,7 +47,6 @@ if TYPE_CHECKING:
 @options.executor_options
 @options.json_option
 @options.device_option
-@options.draw_timeout_option
 @click.option("--watch", is_flag=True, help="Keep running, and render again whenever a file changes that was read.")
 @click.option(
     "--reuse/--no-reuse",

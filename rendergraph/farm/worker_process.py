@@ -177,7 +177,10 @@ class WorkerProcess:
 
     def _loss_error(self, reason: str) -> RenderError:
         self.kill()
-        text = f"worker '{self.name}' ended ({reason}); a driver that crashes or too little memory can cause this"
+        cause = "a driver that crashes or too little memory can cause this"
+        if reason == "SIGALRM":
+            cause = "drawing a frame took longer than --draw-timeout allows"
+        text = f"worker '{self.name}' ended ({reason}); {cause}"
         return RenderError(Problem("RG640", text))
 
     def kill(self) -> None:

@@ -110,7 +110,8 @@ class RenderService:
             finally:
                 self._files = {**self._files, **files}
         self._rendered, frame = rendered, rendered.frame
-        picture, warnings = rendered.display(), frame.warnings
+        picture = rendered.display()
+        warnings = tuple(one for one in frame.warnings if one.code != "RG620")  # the page can play
         if request.still:
             drawing = rendered.drawing
             warnings += tuple(stages.not_finite_warnings(frame, drawing.expanded, self._gpu, drawing.camera))
