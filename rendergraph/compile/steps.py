@@ -266,7 +266,7 @@ class _Compiler(Struct, eq=False, dict=True):
         compiled.draws.append(Draw(program, uniforms, None, call, binds))
 
     def _upload(self, step: Step, compiled: CompiledStep, parity: int) -> None:
-        values = self._uploads.setdefault(step.key, UploadedValues(compiled, self.scene, self.memory))
+        values = self._uploads.setdefault(step.key, UploadedValues(lambda: compiled.step, self.scene, self.memory))
         compiled.before.append(partial(values.write, parity))
 
     def _transfer(self, step: Step, compiled: CompiledStep, parity: int) -> None:

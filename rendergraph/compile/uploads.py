@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy.typing as npt
 from msgspec import Struct
 
-from rendergraph.compile.executable import CompiledStep
 from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.compile.memory import Memory
 from rendergraph.gl import textures
 from rendergraph.scene.facts import FrameScene
-from rendergraph.steps import Upload
+from rendergraph.steps import Step, Upload
 from rendergraph.steps.checks import texels
 
 _CHANGES = {
@@ -24,9 +24,9 @@ _CHANGES = {
 
 
 class UploadedValues(Struct, eq=False):
-    """The values of one upload step."""
+    """The values of one upload step; `step` returns it with today's parameters of its node."""
 
-    compiled: CompiledStep
+    step: Callable[[], Step]
     scene: GpuScene
     memory: Memory
     _array: npt.NDArray[Any] | None = None
@@ -44,14 +44,14 @@ class UploadedValues(Struct, eq=False):
 
     @property
     def upload(self) -> Upload:
-        """What the step uploads, with today's parameters of its node."""
-        found = dict(self.compiled.step.uniforms)["values"]
+        """What the step uploads."""
+        found = dict(self.step().uniforms)["values"]
         assert isinstance(found, Upload)
         return found
 
     def compute(self) -> None:
         """Compute the values; what a third-party function raises is passed on."""
-        values, (write,) = self.upload.values, self.compiled.step.writes
+        values, (write,) = self.upload.values, self.step().writes
         if callable(values):
             desc = self.memory.plan.resources[write.resource].desc
             values = texels(write.name, values(FrameScene(self.scene.scene)), desc, write.mip, write.layer)
@@ -59,7 +59,7 @@ class UploadedValues(Struct, eq=False):
 
     def write(self, parity: int) -> None:
         """Upload the values."""
-        (write,) = self.compiled.step.writes
+        (write,) = self.step().writes
         assert self._array is not None
         if write.use == "buffer":
             self.memory.buffer(write.resource, parity).write(self._array.tobytes())
