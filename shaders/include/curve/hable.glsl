@@ -1,10 +1,10 @@
-// J. Hable, "Filmic Tonemapping Operators", 2010: a film's toe and shoulder, per channel, with his exposure of one stop
-// and his linear white of 11.2.
+// J. Hable, "Filmic Tonemapping Operators", 2010: toe and shoulder of film, per channel, with his exposure of one stop
+// and linear white of 11.2.
 vec3 hable_film(vec3 c) {
-    const float shoulder = 0.15, linear = 0.50, angle = 0.10, toe = 0.20, toe_up = 0.02, toe_down = 0.30;
-    vec3 up = c * (shoulder * c + angle * linear) + toe * toe_up;
-    vec3 down = c * (shoulder * c + linear) + toe * toe_down;
-    return up / down - toe_up / toe_down;
+    const float shoulder = 0.15, linear = 0.50, angle = 0.10, toe = 0.20, toe_numerator = 0.02, toe_denominator = 0.30;
+    vec3 numerator = c * (shoulder * c + angle * linear) + toe * toe_numerator;
+    vec3 denominator = c * (shoulder * c + linear) + toe * toe_denominator;
+    return numerator / denominator - toe_numerator / toe_denominator;
 }
 
 vec3 tone_curve(vec3 c) {

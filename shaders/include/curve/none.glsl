@@ -1,4 +1,4 @@
-// No shoulder at all: what is above 1 clips.
+// No tone curve: values above 1 are clipped.
 vec3 tone_curve(vec3 c) {
     return c;
 }

@@ -1,4 +1,5 @@
-// Reinhard et al. 2002, on luminance, with `white` the least luminance that becomes white.
+// Reinhard et al. 2002: the extended operator, applied to luminance. `white` is the smallest luminance that becomes
+// white.
 #include <luminance.glsl>
 
 vec3 tone_curve(vec3 c) {

@@ -1,4 +1,4 @@
-// Reinhard et al. 2002, x/(1+x) on luminance alone.
+// Reinhard et al. 2002: x/(1+x), applied to luminance.
 #include <luminance.glsl>
 
 vec3 tone_curve(vec3 c) {
