@@ -3,12 +3,19 @@
 
 WORKERS ?= 2
 
-# Mesa compiles each shader once and keeps it here, for all workers and for later runs: compiling takes most of the tests' time.
-# Without LLVM's optimisations it compiles twice as fast, and the pictures of tests are small; `make nightly` runs with them.
+# Mesa keeps compiled shaders here, for all workers and for later runs: compiling them takes most of the tests' time.
 export MESA_SHADER_CACHE_DIR ?= $(CURDIR)/.cache/mesa
-test quick: export GALLIVM_PERF ?= nopt
-unexport PYTHONDONTWRITEBYTECODE  # where it is set, every process that a test starts compiles every module again
 $(shell mkdir -p $(MESA_SHADER_CACHE_DIR))
+
+# Where this is set, every process that a test starts compiles every Python module again.
+unexport PYTHONDONTWRITEBYTECODE
+
+# Shaders compile in two thirds of the time without LLVM's optimisations; `make nightly` has them.
+test quick: export GALLIVM_PERF ?= nopt
+
+# With these glibc returns the memory of large blocks when they are freed, which keeps a worker below 1 GB.
+test quick nightly: export MALLOC_MMAP_THRESHOLD_ ?= 4194304
+test quick nightly: export MALLOC_ARENA_MAX ?= 2
 
 .PHONY: check nightly format lint types imports docs pages pictures test quick clean
 

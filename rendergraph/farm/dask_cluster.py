@@ -12,6 +12,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError
 from pathlib import Path
 from typing import Any, TypeAlias
 from uuid import uuid4
@@ -225,7 +226,11 @@ class Dask(Executor):
 
     def _events_of(self, task: Task, future: Future) -> Iterator[Event]:
         begun = time.monotonic()
-        if future.status in ("cancelled", "lost"):
+        answer = None
+        if future.status == "finished":
+            with contextlib.suppress(CancelledError):  # the worker that held it is gone
+                answer = future.result()
+        if answer is None and future.status != "error":
             while self._client.status == "connecting":
                 time.sleep(_POLL)
                 self._check_scheduler(begun)
@@ -235,12 +240,12 @@ class Dask(Executor):
             error = RenderError(Problem("RG640", "the cluster lost the task"))
             yield self.retry(task, "scheduler", error, inputs_lost=True)
             return
-        if future.status == "error":
+        if answer is None:
             error = future.exception()
             text = f"worker lost: {type(error).__name__}: {' '.join(str(error).split())[:300]}"
             yield self.retry(task, "cluster", RenderError(Problem("RG640", text)))
             return
-        worker, messages = future.result()
+        worker, messages = answer
         for kind, value in messages:
             if kind == "item":
                 yield TaskOutput(task, value, worker)

@@ -16,7 +16,7 @@ from rendergraph.resources import shipped_scenes
 Floats = npt.NDArray[np.float64]
 FULL = "gbuffer.precision=full"
 SCENES = ["cornell_box", "spheres", "shadow_study", "stairs", "many_lights", "glass"]
-ASSETS = ["gltf/DamagedHelmet.glb", "sponza/Sponza.gltf", "gltf/UnlitTest.glb", "gltf/AnisotropyStrengthTest.glb"]
+ASSETS = ["gltf/AnisotropyStrengthTest.glb", "gltf/DamagedHelmet.glb", "sponza/Sponza.gltf", "gltf/UnlitTest.glb"]
 MODELS = ["unlit", "phong", "blinn_phong", "anisotropic", "pbr"]
 
 # Window depth in float32 places a point to about 1e-7 of its distance; only narrow highlights of curved metal show it.

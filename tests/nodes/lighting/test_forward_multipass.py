@@ -26,7 +26,7 @@ def test_blended_surfaces_come_last(radiance: Any, steps_off: Any) -> None:
 
 @pytest.mark.nightly(keep=1)
 @pytest.mark.slow
-@pytest.mark.parametrize("scene", ["gltf/DamagedHelmet.glb", "gltf/UnlitTest.glb", "gltf/AlphaBlendModeTest.glb"])
+@pytest.mark.parametrize("scene", ["gltf/AlphaBlendModeTest.glb", "gltf/DamagedHelmet.glb", "gltf/UnlitTest.glb"])
 def test_it_draws_the_forward_picture_of_assets(radiance: Any, steps_off: Any, shared: Path, scene: str) -> None:
     file = shared / "assets" / scene
     assert steps_off(radiance("forward-multipass", file), radiance("forward", file)).max() <= 3
