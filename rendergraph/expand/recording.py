@@ -162,7 +162,7 @@ def is_kept(port: Port) -> bool:
 def record_all(
     graph: Graph, order: list[str], outputs: Mapping[str, Endpoint]
 ) -> tuple[dict[str, Recording], dict[str, str]]:
-    """Record every node that a outputs port needs; return recordings in order, and idle nodes with their reasons."""
+    """Record every node that an output needs; return recordings in order, and idle nodes with their reasons."""
     history_readers = _history_readers(graph, outputs)
     while True:
         recordings, idle = _record(graph, order, outputs, history_readers)
@@ -172,7 +172,7 @@ def record_all(
 
 
 def _history_readers(graph: Graph, outputs: Mapping[str, Endpoint]) -> set[str]:
-    """Nodes that read last frame's values and contribute to a outputs port."""
+    """Nodes that read last frame's values and contribute to an output."""
     history_readers = {node.id for node in graph.nodes for ends in node.inputs.values() for end in ends if end.previous}
     reached: set[str] = set()
     stack = [end.node for end in outputs.values()] if history_readers else []

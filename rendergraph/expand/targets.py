@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 
 from rendergraph.declare import Part
@@ -24,20 +24,37 @@ def overlap(one: tuple[int, int | None], other: tuple[int, int | None]) -> bool:
     return one[0] == other[0] and (one[1] == other[1] or None in (one[1], other[1]))
 
 
-def feedback(request: StepRequest, write: Write, reads: Iterable[Read]) -> str | None:
+def refusals(
+    request: StepRequest, resources: Mapping[str, Resource], writes: Sequence[Write], reads: Sequence[Read]
+) -> Iterator[tuple[str, str]]:
+    """Yield code and text of what a step must not draw to, or read while it draws."""
+    for write in writes:
+        yield from _feedback(request, write, reads)
+    for read in reads:
+        resource = resources.get(read.resource) if read.use == "sample" and read.layer is not None else None
+        if resource is not None and getattr(resource.desc, "kind", "") == "texture3d":
+            yield "RG420", f"it samples a slice of the 3D texture '{resource.id}'; sample all of it as a sampler3D"
+    yield from _undefined_destinations(request, writes)
+    touching: tuple[Read | Write, ...] = (*writes, *reads)
+    uses = {touched.use for touched in touching}
+    if len(writes) > 1 or "depth_test" in uses:
+        yield from _mismatches(resources, writes, reads)
+    for touched in touching if "image" in uses else ():
+        if touched.use == "image" and touched.resource in resources:
+            yield from _not_an_image(touched, resources[touched.resource].desc)
+
+
+def _feedback(request: StepRequest, write: Write, reads: Iterable[Read]) -> Iterator[tuple[str, str]]:
     """A step must not sample what it writes: drivers return old texels, new ones, or a mixture."""
     state = request.options.get("state")
     if write.use == "depth" and state is not None and state.depth_write is False:
-        return None
+        return
     for read in reads:
         if read.resource != write.resource or read.previous or read.use != "sample":
             continue
         if read.mip in (None, write.mip or 0) and overlap((0, read.layer), (0, write.layer)):
-            return (
-                f"it samples '{read.resource}' in the step that writes it; "
-                "blend, sample another mip or layer, or go through an `Internal`"
-            )
-    return None
+            text = f"it samples '{read.resource}' in the step that writes it"
+            yield "RG422", f"{text}; blend, sample another mip or layer, or go through an `Internal`"
 
 
 def target_size(
@@ -53,10 +70,10 @@ def target_size(
     return (1, 1), 1
 
 
-def attachment_mismatch(
+def _mismatches(
     resources: Mapping[str, Resource], writes: Sequence[Write], reads: Iterable[Read]
-) -> str | None:
-    """Explain why attachments of one draw do not fit together: size, samples, layers, or two depth targets."""
+) -> Iterator[tuple[str, str]]:
+    """Attachments of one draw must fit together in size, samples and layers, with one depth target."""
     attached: list[Read | Write] = [write for write in writes if write.use in ("color", "depth")]
     attached += [read for read in reads if read.use == "depth_test"]
     first: tuple[str, _Extent] | None = None
@@ -72,48 +89,38 @@ def attachment_mismatch(
         if first is None:
             first = name, extent
         elif extent != first[1]:
-            return (
-                f"'{first[0]}' is {_difference(first[1], extent)}, but '{name}' is {_difference(extent, first[1])}; "
-                + ("all targets of a step must have the same size, samples and layers")
-            )
+            text = f"'{first[0]}' is {_difference(first[1], extent)}, but '{name}' is {_difference(extent, first[1])}"
+            yield "RG425", f"{text}; all targets of a step must have the same size, samples and layers"
     depths = list(dict.fromkeys(depths))
     if len(depths) > 1:
-        return f"'{depths[0]}' and '{depths[1]}' are both depth; a step can have only one depth target"
-    return None
+        text = f"'{depths[0]}' and '{depths[1]}' are both depth; a step can have only one depth target"
+        yield "RG425", text
 
 
-def undefined_destination(request: StepRequest, writes: Iterable[Write]) -> str | None:
-    """Explain which target a draw blends onto, or tests against, while its contents are undefined."""
+def _undefined_destinations(request: StepRequest, writes: Iterable[Write]) -> Iterator[tuple[str, str]]:
+    """Targets that a draw blends onto, or tests against, while their contents are undefined."""
     state = request.options.get("state")
     if not isinstance(state, State) or request.kind not in ("fullscreen", "geometry", "draw"):
-        return None
+        return
     tested = request.kind != "fullscreen" if state.depth_test is None else state.depth_test
-    if state.blend is None and not tested:
-        return None
     colors = [write for write in writes if write.use == "color"] if state.blend is not None else []
     blends = state.blend if isinstance(state.blend, tuple) else (state.blend,) * len(colors)
     for write, blend in zip(colors, blends, strict=False):
         if write.load == "discard" and blend is not None and blend.takes_destination:
-            return f"it blends onto '{write.resource}', whose contents are undefined; declare it with `clear=`"
+            yield "RG429", f"it blends onto '{write.resource}', whose contents are undefined; declare it with `clear=`"
     for write in writes:
         if write.use == "depth" and write.load == "discard" and tested and state.depth_func != "always":
-            return (
-                f"it tests depth against '{write.resource}', whose contents are undefined; declare it with `clear=0.0`"
-            )
-    return None
+            text = f"it tests depth against '{write.resource}', whose contents are undefined"
+            yield "RG429", f"{text}; declare it with `clear=0.0`"
 
 
-def image_refusal(touched: Read | Write, resource: Resource | None) -> str | None:
-    """Explain why a texture cannot be stored to or loaded from as an image."""
-    desc = resource.desc if resource is not None else None
-    if not isinstance(desc, TextureDesc):
-        return None
-    word = "write" if isinstance(touched, Write) else "load"
-    fmt = FORMATS[desc.format]
-    if not (fmt.is_depth or fmt.srgb or desc.samples > 1):
-        return None
-    what = f"{desc.samples} samples per texel" if desc.samples > 1 else f"the format {desc.format}"
-    return f"it cannot {word} '{touched.resource}' as an image, as it has {what}"
+def _not_an_image(touched: Read | Write, desc: TextureDesc | BufferDesc) -> Iterator[tuple[str, str]]:
+    if isinstance(desc, TextureDesc) and (
+        FORMATS[desc.format].is_depth or FORMATS[desc.format].srgb or desc.samples > 1
+    ):
+        word = "write" if isinstance(touched, Write) else "load"
+        what = f"{desc.samples} samples per texel" if desc.samples > 1 else f"the format {desc.format}"
+        yield "RG426", f"it cannot {word} '{touched.resource}' as an image, as it has {what}"
 
 
 _Extent = tuple[int, int, int, int]  # width, height, samples, layers

@@ -11,15 +11,7 @@ from rendergraph.declare import Function, History, InOut, Input, Internal, Node,
 from rendergraph.errors import InputError
 from rendergraph.expand.model import CAMERA, ENVIRONMENT, VersionedSteps, ViewTable, follow_forwards
 from rendergraph.expand.recording import Recording, is_kept
-from rendergraph.expand.targets import (
-    attachment_mismatch,
-    feedback,
-    image_refusal,
-    overlap,
-    parts_written,
-    target_size,
-    undefined_destination,
-)
+from rendergraph.expand.targets import overlap, parts_written, refusals, target_size
 from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import FunctionBinding, Read, Resource, Role, Step, StepRequest, Use, Where, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
@@ -133,7 +125,9 @@ class _VersionAssignment:
             read, write = self._write(recording, request, name, part, options.get("value"))
             reads += read
             writes.append(write)
-        self._check_targets(recording, request, writes, [*reads, *[read for f in functions for read in f.reads]])
+        all_reads = [*reads, *[read for f in functions for read in f.reads]]
+        for code, text in refusals(request, self.resources, writes, all_reads):
+            raise self._refused(recording, request, code, text)  # while the author's call is still known
         view, view_index = self._view(recording, request, options)
         self._carry_view(writes, view if request.kind == "geometry" else None)
         size, samples = target_size(self.resources, writes, reads)
@@ -196,17 +190,14 @@ class _VersionAssignment:
         port = self.graph[end.node].node.ports()[end.port] if end.previous else None
         if isinstance(port, InOut) and port.first is not None:
             self.firsts[resource] = port.first  # said where the texture is continued, and read from there
-        desc = self._desc_of(end, resource)
+        # Else last frame's value of a node further down.
+        known = self.resources.get(resource)
+        desc = known.desc if known is not None else self.graph.textures[end.now].storage
         if isinstance(desc, BufferDesc):
             use = "buffer"
         version = final if version is None else version
         kind = desc.kind if isinstance(desc, TextureDesc) and part.layer is None else "texture2d"
         return Read(name, resource, version, use, sampler, part.mip, part.layer, end.previous, kind)
-
-    def _desc_of(self, end: Endpoint, resource: str) -> TextureDesc | BufferDesc:
-        if resource in self.resources:
-            return self.resources[resource].desc
-        return self.graph.textures[end.now].storage  # last frame's value of a node further down
 
     def _write(
         self, recording: Recording, request: StepRequest, name: str, part: Part, value: Any
@@ -250,37 +241,6 @@ class _VersionAssignment:
         value = 0.0 if clear is None else clear
         write = Write(name, resource, old + 1, use, load, value, part.mip, part.layer)  # type: ignore[arg-type]
         return read, write
-
-    def _check_targets(
-        self, recording: Recording, request: StepRequest, writes: list[Write], reads: list[Read]
-    ) -> None:
-        """Refuse undefined drawing while the author's call is still known."""
-        for write in writes:
-            text = feedback(request, write, reads)
-            if text is not None:
-                raise self._refused(recording, request, "RG422", text)
-        for read in reads:
-            if read.use == "sample" and read.layer is not None and self._is_3d(read.resource):
-                text = f"it samples a slice of the 3D texture '{read.resource}'; sample all of it as a sampler3D"
-                raise self._refused(recording, request, "RG420", text)
-        text = undefined_destination(request, writes)
-        if text is not None:
-            raise self._refused(recording, request, "RG429", text)
-        touching: tuple[Read | Write, ...] = (*writes, *reads)
-        uses = {touched.use for touched in touching}
-        if len(writes) > 1 or "depth_test" in uses:
-            text = attachment_mismatch(self.resources, writes, reads)
-            if text is not None:
-                raise self._refused(recording, request, "RG425", text)
-        for touched in touching if "image" in uses else ():
-            if touched.use == "image":
-                text = image_refusal(touched, self.resources.get(touched.resource))
-                if text is not None:
-                    raise self._refused(recording, request, "RG426", text)
-
-    def _is_3d(self, resource: str) -> bool:
-        desc = self.resources[resource].desc if resource in self.resources else None
-        return isinstance(desc, TextureDesc) and desc.kind == "texture3d"
 
     def _refused(self, recording: Recording, request: StepRequest, code: str, text: str) -> InputError:
         node = recording.node
