@@ -177,8 +177,9 @@ def define_text(value: object) -> str:
     return repr(value) if isinstance(value, float) else str(value)
 
 
-def counts(given: Counts) -> tuple[int, int, int]:
+def counts(name: str, given: Counts) -> tuple[int, int, int]:
     """Return up to three integers, filled up with 1."""
+    check_argument(name, given, Counts)
     x, y, z = (*(given if isinstance(given, Sequence) else (given,)), 1, 1)[:3]
     return x, y, z
 

@@ -306,7 +306,8 @@ class Steps:
         self._check_buffers(groups=groups)
         options: dict[str, Any] = {"over": over}
         if groups is not None:
-            options = {"groups": groups if isinstance(groups, Port) else checks.counts(groups), "command": command}
+            given = groups if isinstance(groups, Port) else checks.counts("groups", groups)
+            options = {"groups": given, "command": command}
         self._add("compute", {"compute": shader}, out, bindings, defines, label=label, **options)
 
     def clear(self, out: Target, value: float | tuple[float, ...] = 0.0) -> None:
@@ -442,8 +443,7 @@ class Steps:
     ) -> tuple[int, int, int]:
         """Return how many invocations a dispatch needs along each axis."""
         if over is not None and not isinstance(over, Port | Part | str):
-            checks.check_argument("over", over, Counts)
-            return checks.counts(over)
+            return checks.counts("over", over)
         if over is not None:
             part = checks.part_of(self.ports, over, "over")
             desc = self._desc(part.port)

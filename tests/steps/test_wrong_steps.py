@@ -96,10 +96,10 @@ CALLS = {
     'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes=[self.numbers])': "RG423 attributes is [Internal('numbers')], not a mapping from "
     "layouts to buffers or None",
     # compute
-    'steps.compute("a.comp", groups=(1, 0, 1), out=self.small)': "RG423 groups is (1, 0, 1), not one to three whole numbers from 1 up or None",
-    'steps.compute("a.comp", groups=(16 / 8, 1, 1), out=self.small)': "RG423 groups is (2.0, 1, 1), not one to three whole numbers from 1 up or None; divide with //",
-    'steps.compute("a.comp", groups=(1, 1, 1, 1), out=self.small)': "RG423 groups is (1, 1, 1, 1), not one to three whole numbers from 1 up or None",
-    'steps.compute("a.comp", groups="8", out=self.small)': "RG423 groups is '8', not one to three whole numbers from 1 up or None",
+    'steps.compute("a.comp", groups=(1, 0, 1), out=self.small)': "RG423 groups is (1, 0, 1), not one to three whole numbers from 1 up",
+    'steps.compute("a.comp", groups=(16 / 8, 1, 1), out=self.small)': "RG423 groups is (2.0, 1, 1), not one to three whole numbers from 1 up; divide with //",
+    'steps.compute("a.comp", groups=(1, 1, 1, 1), out=self.small)': "RG423 groups is (1, 1, 1, 1), not one to three whole numbers from 1 up",
+    'steps.compute("a.comp", groups="8", out=self.small)': "RG423 groups is '8', not one to three whole numbers from 1 up",
     'steps.compute("a.comp", groups=(1, 1, 1), over=self.small, out=self.small)': "RG423 both over and groups are given; over finds the number of groups itself",
     'steps.compute("a.comp", over="small", out=self.small)': "RG423 over is the text 'small'; give the port itself, self.small",
     'steps.compute("a.comp", over=self.numbers, out=self.numbers)': "RG423 over is the buffer 'numbers'; give the number of invocations, as in over=256",
