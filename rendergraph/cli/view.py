@@ -84,7 +84,11 @@ def command(
     with contextlib.closing(RenderProcess(device, timeout)) as process:
         if export is None:
             process.start()  # while the files are read
-        state = ViewState(selection, Path.cwd(), fps=fps, against=_other(selection, against))
+        other = None
+        if against is not None:
+            other = Path(against).stem, replace(selection, source=against, sets=(), patches=())
+            options.linked(other[1])
+        state = ViewState(selection, Path.cwd(), fps=fps, against=other)
         options.linked(selection)  # reports mistakes before there is a page
         if export is not None:
             from rendergraph.session.gpu import Gpu
@@ -99,15 +103,6 @@ def command(
             _open(server.url)
         say("serving; Ctrl-C ends")
         server.run()
-
-
-def _other(selection: Selection, against: str | None) -> tuple[str, Selection] | None:
-    """Return name and selection of the pipeline to compare with, of the same scene."""
-    if against is None:
-        return None
-    other = replace(selection, source=against, sets=(), patches=())
-    options.linked(other)
-    return Path(against).stem, other
 
 
 def _open(url: str) -> None:

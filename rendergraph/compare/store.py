@@ -166,16 +166,13 @@ class ResultsLog:
         line = json.dumps({**record, CHECKSUM: checksum(record)}, ensure_ascii=False) + "\n"
         try:
             new = not self.path.exists()
-            handle = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o666)
-            try:
-                size = os.fstat(handle).st_size
-                torn = size > 0 and os.pread(handle, 1, size - 1) != b"\n"
-                data = (b"\n" if torn else b"") + line.encode(errors="backslashreplace")
-                while data:
-                    data = data[os.write(handle, data) :]
-                os.fsync(handle)
-            finally:
-                os.close(handle)
+            with self.path.open("ab+") as file:
+                size = file.tell()
+                file.seek(max(0, size - 1))
+                torn = size > 0 and file.read(1) != b"\n"
+                file.write((b"\n" if torn else b"") + line.encode(errors="backslashreplace"))
+                file.flush()
+                os.fsync(file.fileno())
             if new:
                 flush(self.path.parent)
         except OSError as error:
@@ -348,17 +345,15 @@ def locked(out: Path) -> Iterator[None]:
 
     try:
         out.mkdir(parents=True, exist_ok=True)
-        lock = os.open(out / _LOCK, os.O_RDWR | os.O_CREAT, 0o666)
+        lock = (out / _LOCK).open("ab")
     except OSError as error:
         raise _refused(out, error.strerror or str(error)) from error
-    try:
+    with lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise _refused(out, "another sweep is running in it; wait until it ends, or use another folder") from None
         yield
-    finally:
-        os.close(lock)
 
 
 def check_folder(out: Path, study: Mapping[str, Any], *, resume: bool) -> None:

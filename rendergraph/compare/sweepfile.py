@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, get_args
@@ -16,7 +15,7 @@ from rendergraph.errors import InputError, Problem
 from rendergraph.keys import Codes, Key, MapOf, Table, Validator, plain
 from rendergraph.keys.values import TEXT, choice, listed, shipped, version, whole, word
 from rendergraph.read import SIZE, entries
-from rendergraph.resources import shipped_pipelines, shipped_scenes
+from rendergraph.resources import is_name, shipped_pipelines, shipped_scenes
 
 MOST_MEASURED = 10_000
 """Maximum number of measured frames."""
@@ -122,7 +121,8 @@ def read_sweep(path: Path) -> SweepFile:
         raise InputError(validator.problems)
     values = plain(root, SWEEP)
     groups = {",".join(group.plain()): group for group in _items(root.get("zip"))}
-    values |= {key: _beside(path, values[key]) for key in ("pipeline", "reference", "scene") if key in values}
+    files = [key for key in ("pipeline", "reference", "scene") if key in values and not is_name(values[key])]
+    values |= {key: str(path.parent / values[key]) for key in files}
     given, minimise = root.get("set"), values.get("minimise", ())
     options = {name: values[key] for key, name in _OPTIONS.items() if key in values}
     options["minimise"] = (minimise,) if isinstance(minimise, str) else tuple(minimise)
@@ -160,8 +160,3 @@ def _axis(path: str, given: Value, validator: Validator) -> Axis | None:
 
 def _items(value: Value | None) -> Sequence[Value]:
     return value.data if value is not None and isinstance(value.data, list) else ()
-
-
-def _beside(file: Path, name: str) -> str:
-    """Return a name as the command line takes it: shipped ones as they are, paths joined to the file's folder."""
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else str(file.parent / name)

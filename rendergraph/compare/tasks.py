@@ -304,6 +304,8 @@ def first_difference(
     A pass that only one of the two has is not a difference by itself: the passes that read it show whether it matters.
     The frames are from `every_output`; plan and graph are the variant's.
     """
+    import networkx as nx  # needed for a difference alone, and slow to import
+
     counterparts = {new: old for old, new in difference.nodes.items()}
     for node in passes(plan):
         if node not in counterparts:
@@ -314,7 +316,8 @@ def first_difference(
                 continue
             most, share = _amount(a, b)
             semantic = variant.info(f"{node}.{port}").semantic
-            causes = _causes(graph, node, difference)
+            leading, changed = {node, *nx.ancestors(graph.dag, node)}, {*difference.changed(), *difference.added}
+            causes = tuple(n.id for n in graph.nodes if n.id in leading & changed)
             added = tuple(cause for cause in causes if cause in difference.added)
             return Difference(node, counterparts[node], port, most, share, causes, added, (a, b), semantic)
     return None
@@ -335,12 +338,3 @@ def _amount(a: Pixels, b: Pixels) -> tuple[float | None, float]:
     if a.dtype == np.uint8:
         distance = distance / 255
     return (float(distance.max()) if distance.size else 0.0), float(texels.mean())
-
-
-def _causes(graph: Graph, node: str, difference: GraphDiff) -> tuple[str, ...]:
-    """Return the nodes that differ in structure among a pass and everything it reads."""
-    import networkx as nx  # needed for a difference alone, and slow to import
-
-    changed: Mapping[str, object] = difference.changed()
-    leading = {node, *nx.ancestors(graph.dag, node)}
-    return tuple(n.id for n in graph.nodes if n.id in leading and (n.id in changed or n.id in difference.added))

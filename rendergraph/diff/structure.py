@@ -164,12 +164,12 @@ def _is_renamed(old: GraphNode, new: GraphNode, nodes: Mapping[str, str]) -> boo
         return False
     pairs = [pair for port, ends in old.inputs.items() for pair in zip(ends, new.inputs[port], strict=True)]
     matches = {**nodes, old.id: new.id}  # it may read its own last frame
-    return all(x.port == y.port and x.previous == y.previous and _same_source(x, y, matches) for x, y in pairs)
-
-
-def _same_source(x: Endpoint, y: Endpoint, nodes: Mapping[str, str]) -> bool:
     # Last frame's value may come from a node downstream, which is recognised only later.
-    return nodes.get(x.node) == y.node or (x.previous and x.node not in nodes)
+    return all(
+        (x.port, x.previous) == (y.port, y.previous)
+        and (matches.get(x.node) == y.node or (x.previous and x.node not in matches))
+        for x, y in pairs
+    )
 
 
 def _readers(graph: Graph) -> dict[str, set[tuple[str, str]]]:

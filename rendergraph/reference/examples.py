@@ -120,16 +120,15 @@ def _links(node_type: NodeType, base: Graph, optional: set[str]) -> Links | None
         if port.optional and name not in optional:
             continue
         group = next((group for group, members in groups.items() if name in members), None)
-        end = _node_with(base, groups[group]) if group is not None else _best_end(base, name, port)
+        if group is None:
+            end = _best_end(base, name, port)
+        else:
+            end = next((node.id for node in base.nodes if set(groups[group]) <= node.type.cls.outputs().keys()), None)
         if end:
             links[group or name] = end
         elif not port.optional:
             return None
     return links
-
-
-def _node_with(base: Graph, members: tuple[str, ...]) -> str | None:
-    return next((node.id for node in base.nodes if set(members) <= node.type.cls.outputs().keys()), None)
 
 
 def _best_end(base: Graph, name: str, port: Input | InOut) -> str | None:
