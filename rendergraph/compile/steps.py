@@ -145,7 +145,9 @@ class _Compiler(Struct, eq=False, dict=True):
             for draw in compiled.all_draws:
                 draw.uniforms |= {name: unit for name, unit in units.items() if name in draw.program.uniforms}
         self._watch(step, compiled)
-        stored = [write for write in step.writes if write.use in ("buffer", "image") and step.kind != "clear"]
+        stored = [
+            write for write in step.writes if write.use in ("buffer", "image") and step.kind not in ("clear", "upload")
+        ]
         compiled.before += [
             clear_buffer(self.device, self.memory, write, parity)
             for write in stored
@@ -245,7 +247,8 @@ class _Compiler(Struct, eq=False, dict=True):
             state = self._state(step, depth_default=True, cull=multi_draw.cull, clockwise=multi_draw.clockwise)
             return Draw(program, uniforms, state, multi_draw.call(vertex_array), binds, vertex_array)
 
-        turns = any(use.use == "buffer" and len(self.plan.placement[use.resource]) == 2 for use in step.all_reads)
+        uses: tuple[Read | Write, ...] = (*step.all_reads, *step.writes)
+        turns = any(use.use == "buffer" and len(self.plan.placement[use.resource]) == 2 for use in uses)
         key = (*step.key, parity if turns else 0)
         if key not in self._geometry_draws:  # one set of command buffers for both parities, unless buffers differ
             self._geometry_draws[key] = self.geometry.draws(step, make)

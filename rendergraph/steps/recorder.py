@@ -341,9 +341,8 @@ class Steps:
         if desc is not None:
             checks.check_part(part, desc)
         if callable(values):
-            content = f"{getattr(values, '__module__', '')}.{getattr(values, '__qualname__', id(values))}"
-            owner = getattr(values, "__self__", None)
-            content += f" of {owner!r}" if owner is not None else f" at {id(values):#x}"
+            function = getattr(values, "__func__", values)  # that of a module that is imported again is another one
+            content = f"{id(function):#x} of {getattr(values, '__self__', None)!r}"
         else:
             values = checks.texels(part.port.name, values, desc, part.mip, part.layer)
             content = f"{values.dtype} {values.shape} {sha1(values.tobytes()).hexdigest()}"

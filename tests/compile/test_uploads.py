@@ -160,3 +160,46 @@ def test_a_layer_and_a_mip_are_given_values(draw: Draw) -> None:
     }
     text = "nodes: {a: {type: volume}, b: {type: reads, inputs: {source: a.color}}}\noutputs: {image: b.color}"
     assert draw(text, Volume, Reads, shaders=shaders)["image"].max() == 6 + 7
+
+
+class Cleared(Node):
+    """A buffer that is cleared where nothing else gives it values."""
+
+    color = Output(Radiance, format="rgba32f", doc="Its values.")
+    table = Internal(kind="buffer", bytes=16, clear=0)
+
+    def record(self, steps: Steps) -> None:
+        steps.upload(self.table, np.arange(4, dtype=np.float32))
+        steps.fullscreen("table.frag", out=self.color, table=self.table)
+
+
+TABLE_SHADER = "layout(std430) readonly buffer table { vec4 value; }; out vec4 color; void main() { color = value; }"
+
+
+def test_clearing_a_buffer_leaves_what_is_uploaded(draw: Draw) -> None:
+    text = "nodes: {a: {type: cleared}}\noutputs: {image: a.color}"
+    image = draw(text, Cleared, shaders={"table.frag": TABLE_SHADER})["image"]
+    np.testing.assert_array_equal(image[0, 0], [0, 1, 2, 3])
+
+
+EDITED = """from rendergraph.api import Internal, Node, Output, Radiance, Steps
+class Edited(Node):
+    '''Values of a method.'''
+    color = Output(Radiance, format="rgba32f", doc="Its values.")
+    table = Internal(kind="buffer", bytes=16, kept=True)
+    def record(self, steps: Steps) -> None:
+        steps.upload(self.table, self.values)
+        steps.fullscreen("edited.frag", out=self.color, table=self.table)
+    def values(self, scene):
+        import numpy as np
+        return np.full(4, {}, np.float32)
+"""
+
+
+def test_an_edited_method_computes_again(author: Any, gl: rg.Session) -> None:
+    author.write(edited__py=EDITED.format(1), edited__frag=TABLE_SHADER)
+    first = author.pipeline("nodes: {a: {type: edited}}\noutputs: {image: a.color}", scene=SCENE)
+    assert gl.render(first)["image"][0, 0, 0] == 1
+    author.write(edited__py=EDITED.format(20))
+    again = rg.load(first.selection.source, plugins=first.selection.plugins)
+    assert gl.render(again)["image"][0, 0, 0] == 20

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from rendergraph.api import ADD, Depth, History, InOut, Input, Luminance, Node, Output, State, Steps
+from rendergraph.api import ADD, Depth, History, InOut, Input, Internal, Luminance, Node, Output, State, Steps
 from rendergraph.api import Any as AnyTexel
 from rendergraph.errors import InputError
 
@@ -366,3 +366,30 @@ outputs: {image: a.there}"""
     assert len(places) > 50
     assert np.abs(places[:, [0, 2]]).max() < 1e-3
     assert np.abs(places[:, 1]).max() > 0.02
+
+
+class Fragments(Node):
+    """Counts an object's fragments, and shows this frame's and last frame's count."""
+
+    color = Output(Luminance, format="rg32f", doc="Now and before.")
+    depth = Internal(Depth, format="depth32f", clear=0.0)
+    count = History(kind="buffer", bytes=4, clear=0)
+
+    def record(self, steps: Steps) -> None:
+        steps.geometry(fragment="count.frag", out={"depth": self.depth, "count": self.count})
+        steps.fullscreen("counts.frag", now=self.count, before=self.count.previous, out=self.color)
+
+
+def test_geometry_that_stores_into_a_history_takes_turns_with_it(bench: Any) -> None:
+    shaders = {
+        "count.frag": "layout(std430) buffer count { uint value; }; void main() { atomicAdd(value, 1u); }",
+        "counts.frag": """layout(std430) readonly buffer now { uint a; }; layout(std430) readonly buffer before { uint b; };
+            out vec2 color; void main() { color = vec2(a, b); }""",
+    }
+    scene = "objects: {a: {shape: box, size: [9, 9, 1]}}\ncameras: {main: {eye: [0, 0, 5], target: [0, 0, 0]}}\n"
+    text = "nodes: {f: {type: fragments}}\noutputs: {image: f.color}"
+    frames = bench.frames(text, Fragments, shaders=shaders, scene=scene, frames=range(1, 5))
+    counts = [tuple(frame["image"][0, 0]) for frame in frames]
+    full = counts[0][0]
+    assert full > 0
+    assert counts == [(full, 0), *[(full, full)] * 3]
