@@ -253,7 +253,7 @@ _STD430 = {  # GLSL type: NumPy type of a component, shape, alignment in compone
 } | {"mat4": ("<f4", (4, 4), 4)}
 
 
-class Layout(Struct, frozen=True):
+class Layout(Struct, frozen=True, eq=False):
     """The elements of a buffer, the same in GLSL and in NumPy: `Layout("Spark", {"position": "vec3", "age": "float"})`.
 
     Shaders that use the buffer may use the struct of that name. Matrices are arrays of columns.
@@ -270,6 +270,9 @@ class Layout(Struct, frozen=True):
         wrong = [f"{kind} {name}" for name, kind in self.fields.items() if kind not in _STD430]
         if wrong or not self.fields:
             raise TypeError(f"Layout '{self.name}' cannot hold {wrong or 'nothing'}; available: {', '.join(_STD430)}")
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Layout) and self.glsl == other.glsl  # the order of fields counts
 
     def __hash__(self) -> int:
         return hash(self.name)

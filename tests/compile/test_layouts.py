@@ -86,6 +86,7 @@ def test_fields_lie_where_std430_has_them() -> None:
     assert {name: fields[name][1] for name in SPARK.fields} == OFFSETS
     assert SPARK.dtype.itemsize == 144
     assert Layout("Small", {"a": "float", "b": "uint", "c": "int"}).dtype.itemsize == 12
+    assert Layout("Two", {"a": "float", "b": "vec3"}) != Layout("Two", {"b": "vec3", "a": "float"})
     with pytest.raises(TypeError, match=r"Layout 'Bad' cannot hold \['double a'\]; available: float, vec2"):
         Layout("Bad", {"a": "double"})
 
