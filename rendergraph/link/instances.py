@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -126,7 +127,7 @@ def unknown_type(spec: PipelineSpec, catalog: Catalog, name: str) -> str:
     if name in spec.unrun:
         return f"node type '{name}' is Python, which a pipeline file cannot load; pass --plugin {spec.unrun[name]}"
     file = spec.path.with_name(f"{name}.py") if spec.path is not None else Path()
-    if file.is_file():
+    if os.path.isfile(file):  # a name may be too long for a file's
         return (
             f"node type '{name}' is Python beside the file and not loaded by itself; pass --plugin {shown_file(file)}"
         )

@@ -371,6 +371,12 @@ outputs: {image: e.color}
     ]
 
 
+def test_a_type_may_be_too_long_for_a_file_name(tmp_path: Path, toy_catalog: Catalog) -> None:
+    (tmp_path / "long.yaml").write_text(f"rendergraph: 1\nnodes: {{a: {{type: {'q' * 300}}}}}\noutputs: {{o: a.x}}")
+    with pytest.raises(InputError, match="RG102 there is no node type 'qqq"):
+        link(resolve(tmp_path / "long.yaml", catalog=toy_catalog), toy_catalog)
+
+
 def test_a_broken_plugin_is_told_once(tmp_path: Path) -> None:
     (tmp_path / "broken.py").write_text("raise RuntimeError('no')\n")
     catalog = Catalog.discover([tmp_path], installed=False)
