@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from rendergraph.catalog import Catalog
 from rendergraph.compare.batches import MOST_RUNS
 from rendergraph.compare.prepare import (
+    SweepKeywords,
     SweepOptions,
     measured_at,
     named_reference,
@@ -89,7 +90,7 @@ def compare(
     options: SweepOptions = SweepOptions(frames=10),
     *,
     names: Sequence[str] = (),
-    **settings: Any,
+    **settings: Unpack[SweepKeywords],
 ) -> Comparison:
     """Render pipelines with one scene, one camera and at one size, and compare the pictures.
 
@@ -138,7 +139,7 @@ def sweep(
     out: Path | str,
     reference: Path | Pipeline | str | None = None,
     options: SweepOptions = SweepOptions(),
-    **settings: Any,
+    **settings: Unpack[SweepKeywords],
 ) -> Sweep:
     """Render every combination of the axes' values into a folder each, and measure it.
 

@@ -12,10 +12,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
 
 from rendergraph.compare.engine import Sweep, sweep
-from rendergraph.compare.prepare import Prepared, SweepOptions, prepare
+from rendergraph.compare.prepare import Prepared, SweepKeywords, SweepOptions, prepare
 from rendergraph.compare.results import OBJECTIVES, Result, Search, objective_values, pareto_front
 from rendergraph.compare.space import Axes, Axis, Space, typed
 from rendergraph.errors import InputError, Problem, suggestion
@@ -124,7 +124,7 @@ def search(
     out: Path,
     reference: Path | Pipeline | None,
     options: SweepOptions = SweepOptions(),
-    **settings: Any,
+    **settings: Unpack[SweepKeywords],
 ) -> Sweep:
     """Search for the settings that minimise one or several objectives.
 

@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias, TypedDict
 
 import numpy as np
 from msgspec import Struct, structs
@@ -43,6 +43,30 @@ Pictures: TypeAlias = Literal["all", "best"]
 Events: TypeAlias = Callable[[Mapping[str, Any]], None]
 
 
+class SweepKeywords(TypedDict, total=False):
+    """The attributes of `SweepOptions` as keywords."""
+
+    metric: str | None
+    frame: int
+    frames: int
+    repeats: int
+    kept: Pictures
+    best: Sequence[str]
+    only: Sequence[int] | None
+    resume: bool
+    most_bytes: int
+    minimise: Sequence[str]
+    budget: int
+    seed: int
+    session: Gpu | None
+    device: int | None
+    executor: ExecutorChoice
+    devices: Sequence[int]
+    timeout: float | None
+    progress: Progress | bool | None
+    events: Events | None
+
+
 class SweepOptions(Struct, frozen=True, kw_only=True, eq=False):
     """How a sweep renders and measures; `compare` uses what applies to it.
 
@@ -75,11 +99,11 @@ class SweepOptions(Struct, frozen=True, kw_only=True, eq=False):
     frames: int = 5
     repeats: int = 1
     kept: Pictures = "all"
-    best: tuple[str, ...] = ("flip", "ms")
+    best: Sequence[str] = ("flip", "ms")
     only: Sequence[int] | None = None
     resume: bool = False
     most_bytes: int = MOST_BYTES
-    minimise: tuple[str, ...] = ()
+    minimise: Sequence[str] = ()
     budget: int = 50
     seed: int = 0
     session: Gpu | None = None

@@ -19,7 +19,8 @@ import rendergraph.link
 import rendergraph.resolve
 import rendergraph.schedule
 from rendergraph.cli import main, options
-from rendergraph.compare import Axis, compare, sweep
+from rendergraph.compare import Axis, SweepOptions, compare, sweep
+from rendergraph.compare.prepare import SweepKeywords
 from rendergraph.errors import InputError, RenderError, UsageError
 from rendergraph.session import RenderOptions, Selection, gpu_cache, stages
 from rendergraph.session.selection import RenderKeywords
@@ -115,6 +116,7 @@ def test_every_spelling_has_the_same_fields() -> None:
     assert set(inspect.signature(rg.load).parameters) == selected
     assert {"source", *options.SELECTION_OPTIONS} == selected
     assert list(RenderKeywords.__annotations__) == [field.name for field in fields(RenderOptions)]
+    assert list(SweepKeywords.__annotations__) == [field.name for field in fields(SweepOptions)]
 
 
 def test_keywords_become_options() -> None:
