@@ -116,7 +116,7 @@ def test_every_spelling_has_the_same_fields() -> None:
     assert set(inspect.signature(rg.load).parameters) == selected
     assert {"source", *options.SELECTION_OPTIONS} == selected
     assert list(RenderKeywords.__annotations__) == [field.name for field in fields(RenderOptions)]
-    assert list(SweepKeywords.__annotations__) == [field.name for field in fields(SweepOptions)]
+    assert tuple(SweepKeywords.__annotations__) == SweepOptions.__struct_fields__
 
 
 def test_keywords_become_options() -> None:
