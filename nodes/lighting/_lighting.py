@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from rendergraph.api import (
     PREMULTIPLIED,
@@ -33,6 +33,20 @@ from ..geometry._samples import Samples
 
 UNDER = Blend("one_minus_dst_alpha", "one")
 Color = float | tuple[float, float, float]
+_OLD_METHODS = {
+    "around": "environment_reads",
+    "ambient_light": "ambient_reads",
+    "blend": "draw_transparent",
+    "blend_after": "draw_backdrop_and_transparent",
+    "blend_over": "draw_backdrop_and_transparent",
+    "lay_under": "draw_backdrop",
+    "light_opaque": "draw_opaque",
+    "lights_of": "lighting_reads",
+    "pictures": "color_targets",
+    "shadows": "shadow_reads",
+    "shadows_on_blended": "transparent_shadows",
+    "surface": "gbuffer_reads",
+}
 DIFFUSE = "The same radiance without the specular part, which lights other surfaces."
 
 
@@ -84,6 +98,15 @@ class Lighting(Node):
         default=True, doc="Occlude the specular environment light less than the diffuse one on smooth surfaces."
     )
 
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Return a method by its old name, for plugins that extend a lighting node, with a warning."""
+            if name not in _OLD_METHODS:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            warnings.warn(f"`{name}` is now called `{_OLD_METHODS[name]}`", DeprecationWarning, stacklevel=2)
+            return getattr(self, _OLD_METHODS[name])
+
     def wants_lights(self, steps: Steps) -> bool:
         """Return whether punctual lights contribute to the picture."""
         return "nothing" not in steps.needs("shading") and self.terms in ("all", "diffuse", "specular")
@@ -92,11 +115,6 @@ class Lighting(Node):
         """Record the BRDF table, if surfaces reflect an environment."""
         if "brdf_table" in self.environment_reads(steps):
             steps.fullscreen("brdf_table.frag", out=self.brdf_table, defines={"TABLE_SAMPLES": 512}, label="table")
-
-    def around(self, steps: Steps) -> dict[str, Any]:
-        """Return `environment_reads`, of which this is the old name."""
-        warnings.warn("`around` is now called `environment_reads`", DeprecationWarning, stacklevel=2)
-        return self.environment_reads(steps)
 
     def environment_reads(self, steps: Steps) -> dict[str, Any]:
         """Return what a shader reads for environment lighting; nothing if it would not contribute."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 import yaml
 
 import rendergraph as rg
@@ -105,6 +106,26 @@ def test_a_shading_model_with_old_names_draws_the_same(gl: rg.Session, tmp_path:
         pictures.append(gl.render(pipeline)["image"])
         assert [problem.code for problem in pipeline.check().warnings] == ["RG449"] * (3 if age == "old" else 0)
     assert np.array_equal(pictures[0], pictures[1])
+
+
+def test_a_node_may_call_methods_of_lighting_by_their_old_names(author: Any) -> None:
+    body = """
+    def record(self, steps):
+        Lighting.record(self, steps)
+        reads = self.around(steps) | {"lookup": self.lookup}
+        steps.geometry("forward_lighting.frag", out=self.pictures(steps), objects="opaque", **reads)
+        self.blend_after(steps)
+"""
+    imports = "from rendergraph.nodes.lighting._lighting import Lighting\n"
+    author.write(lit__py=imports + LIGHTING + body)
+    pipeline = author.pipeline(NODES, scene="objects: {box: {shape: box}}\n")
+    with pytest.warns(DeprecationWarning, match="is now called") as warned:
+        assert pipeline.expand().expansion.steps
+    assert [str(one.message) for one in warned] == [
+        "`around` is now called `environment_reads`",
+        "`pictures` is now called `color_targets`",
+        "`blend_after` is now called `draw_backdrop_and_transparent`",
+    ]
 
 
 def test_an_old_include_is_found(author: Any) -> None:
