@@ -25,7 +25,10 @@ _KINDS = ("pipeline", "scene", "sweep", "results", "results-csv")
 @click.command("check", no_args_is_help=True)
 @options.pipeline_options
 @options.json_option
-def check(selection: Selection, as_json: bool) -> None:
+@click.option(
+    "--profile", type=click.Choice(["guaranteed"]), help="Also require that every OpenGL 4.5 device can draw it."
+)
+def check(selection: Selection, as_json: bool, profile: str | None) -> None:
     """Find every error, without a GPU.
 
     Checks the pipeline, everything it refers to, its scene and the options; of a sweep file, every run. Exits 0 if
@@ -35,6 +38,7 @@ def check(selection: Selection, as_json: bool) -> None:
     Examples:
       rendergraph check forward
       rendergraph check forward --scene spheres -s light.ambient=0.1 --json
+      rendergraph check full --profile guaranteed
     """
     from rendergraph.compare.sweepfile import is_sweep
     from rendergraph.schema import outdated
@@ -45,6 +49,8 @@ def check(selection: Selection, as_json: bool) -> None:
     if is_sweep(Path(selection.source)):
         from rendergraph.cli.sweep import check_file
 
+        if profile is not None:
+            raise click.UsageError("--profile checks a pipeline, not a sweep file")
         file = selection.source
         runs, warnings = check_file(Path(file), lambda name: replace(selection, source=name))
         warn(warnings)
@@ -53,7 +59,10 @@ def check(selection: Selection, as_json: bool) -> None:
             emit_json({"sweep": file, "runs": runs, "warnings": [problem.as_json() for problem in warnings]})
         return
     linked = options.link(selection)
-    later = list(stages.check(linked).warnings)
+    planned = stages.check(linked)
+    later = list(planned.warnings)
+    if profile is not None:
+        stages.check_profile(planned)
     graph, path = linked.graph, linked.spec.path
     if path and not is_picture(path):
         stale = outdated(path, Roots.of_file(path, selection.asset_roots), linked.catalog, selection.plugins)

@@ -39,7 +39,7 @@ def context(index: int) -> dict[str, Any]:
                 "compute shaders": version >= 430 or "GL_ARB_compute_shader" in extensions,
                 "texture views": version >= 430 or "GL_ARB_texture_view" in extensions,
                 "indirect multi-draw": version >= 430 or "GL_ARB_multi_draw_indirect" in extensions,
-                "depth bounds": device.has_depth_bounds,
+                "depth bounds": bool(device.limits["depth_bounds"]),
                 "memory objects": "GL_EXT_memory_object" in extensions,
             },
             "limits": dict(device.limits),

@@ -15,12 +15,11 @@ from msgspec import Struct, field
 
 from rendergraph.compile.culling import commands
 from rendergraph.compile.programs import ProgramCache
-from rendergraph.compile.views import FIXED_BLOCKS
 from rendergraph.gl import textures
 from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import GpuTexture
-from rendergraph.program.variants import light_macros, scene_macros, storage_blocks
+from rendergraph.program.variants import FIXED_BLOCKS, light_macros, scene_macros, storage_blocks
 from rendergraph.scene import pack
 from rendergraph.scene.model import ImageSource, MadeImage, Scene, Texture, changed_objects
 from rendergraph.scene.pack import PackedScene, Records

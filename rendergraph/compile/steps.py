@@ -17,13 +17,12 @@ from rendergraph.compile.checks import attribute_formats, check_attributes, chec
 from rendergraph.compile.executable import CompiledStep, Draw, Executable, SortedDraws, named, step_uniforms
 from rendergraph.compile.geometry import GeometryCompiler, MultiDraw
 from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES, SCENE_ATTRIBUTES, GpuScene
-from rendergraph.compile.limits import check_plan, groups_of
 from rendergraph.compile.memory import Call, Memory, Region, TexturePool, clear_target
 from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.transfers import clear_buffer, image_calls, transfer_calls
 from rendergraph.compile.units import Units
 from rendergraph.compile.uploads import UploadedValues
-from rendergraph.compile.views import FIXED_BLOCKS, ViewBuffers
+from rendergraph.compile.views import ViewBuffers
 from rendergraph.expand import ViewTable
 from rendergraph.gl import state as gl_state
 from rendergraph.gl.device import Device
@@ -31,7 +30,8 @@ from rendergraph.gl.programs import Program
 from rendergraph.gl.queries import OcclusionQuery, Timer
 from rendergraph.gl.textures import Clear, poison_value
 from rendergraph.program import StepTexts, Texts, check_kept_text, positions_macro
-from rendergraph.program.variants import view_count
+from rendergraph.program.limits import check_plan, groups_of
+from rendergraph.program.variants import FIXED_BLOCKS, view_count
 from rendergraph.schedule import step_names
 from rendergraph.steps import Read, Step, Write
 from rendergraph.textures import FORMATS, TextureDesc
@@ -64,7 +64,7 @@ def compile_plan(
     Args:
         poison: overwrite released textures with a value that no picture should show.
     """
-    check_plan(device, plan, views, len(FIXED_BLOCKS))
+    check_plan(device.limits, plan, views)
     memory = Memory(device, plan, scene.environment, pool)
     buffers = ViewBuffers(device, views)
     compiler = _Compiler(device, plan, types, views, scene, programs, memory, buffers, poison)
@@ -366,7 +366,7 @@ class _Compiler(Struct, eq=False, dict=True):
         bounds: Call | None = None
         if state.depth_bounds is not None:
             bounds = partial(self.device.raw.glDepthBoundsEXT, *state.depth_bounds)
-        elif within is not None and depth is not None and self.device.has_depth_bounds:
+        elif within is not None and depth is not None and self.device.limits["depth_bounds"]:
             bounds = partial(within.bound_depth, self.device.raw)
         if bounds is not None:
             compiled.before += [partial(self.device.raw.glEnable, _DEPTH_BOUNDS_TEST), bounds]

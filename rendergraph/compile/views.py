@@ -11,18 +11,9 @@ from msgspec import Struct
 from rendergraph.errors import Misuse, Problem, RenderError
 from rendergraph.expand import CAMERA, ViewTable
 from rendergraph.gl.device import Device
+from rendergraph.program.variants import FIXED_BLOCKS
 from rendergraph.scene.pack import VIEW, pack_view
 from rendergraph.steps import ViewMatrices
-
-FIXED_BLOCKS = {
-    "camera_block": 0,
-    "frame_block": 1,
-    "light_block": 2,
-    "material_block": 3,
-    "material_uv_block": 4,
-    "environment_block": 5,
-}
-"""Binding points of the blocks the framework keeps; view tables follow."""
 
 
 class ViewBuffers(Struct, eq=False, dict=True):

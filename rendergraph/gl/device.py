@@ -114,10 +114,6 @@ class Device(Struct, eq=False, dict=True):
         if self.stores_blocks:
             buffer.bind_to_storage_buffer(point)
 
-    @cached_property
-    def has_depth_bounds(self) -> bool:
-        return "GL_EXT_depth_bounds_test" in self.ctx.extensions
-
     def as_json(self) -> dict[str, object]:
         """Return the fields that pictures and reports contain."""
         return {
@@ -246,5 +242,6 @@ def _wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
         "storage_bindings": raw.integer(0x90DD),
         **{f"groups_{axis}": raw.integer(0x91BE, number) for number, axis in enumerate("xyz")},
     }
+    limits["depth_bounds"] = int("GL_EXT_depth_bounds_test" in ctx.extensions)
     raw.error()  # from limits that this driver does not know
     return Device(ctx, raw, owned, limits)

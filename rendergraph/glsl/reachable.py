@@ -43,6 +43,11 @@ def reachable_names(text: str) -> set[str]:
     return found
 
 
+def compiled_text(text: str) -> str:
+    """Return the lines of a text that are compiled, as far as its own macros decide it, without directives."""
+    return "\n".join(_taken(text, {}))
+
+
 def _taken(text: str, uses: dict[str, list[Sequence[str]]]) -> Iterator[str]:
     """Yield the lines that are compiled, without directives; the words of macros go to `uses`."""
     macros: set[str] = set()

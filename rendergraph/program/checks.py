@@ -122,7 +122,7 @@ def _check_samplers(step: Step, texts: Mapping[str, StageText], resources: Mappi
     reads = dict(_sampled(step, resources))
     problems = []
     for text in texts.values():
-        for name, kinds in _samplers(text.text).items():
+        for name, kinds in declared_samplers(text.text).items():
             found = [unfit_sampler(step, kind, reads[name], resources) for kind in kinds] if name in reads else [None]
             if found[0] is not None and None not in found:  # a branch of an `#if` may declare the right type
                 problems.append(_placed(found[0], text, [name]))
@@ -176,7 +176,7 @@ def _always(text: str) -> str:
     return "\n".join(kept)
 
 
-def _samplers(text: str) -> dict[str, list[str]]:
+def declared_samplers(text: str) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for kind, names in re.findall(_SAMPLER, text):
         for name in re.findall(_NAME, names):
@@ -199,7 +199,7 @@ def check_kept_text(step: Step, texts: Texts, cls: type[Node], resources: Mappin
         for name in sorted((names & samplers & cls.inputs().keys()) - given):
             problem = step.problem("RG439", f"it makes '{kept}', which is kept, but samples '{name}', which is not")
             problems.append(_placed(problem, text, [name]))
-        for block, members in blocks:
+        for _, block, members in blocks:
             used = sorted(names & members)
             if used and (block in _MOVING or block.endswith("_view_block")):
                 what = _MOVING.get(block, "a view, which `update` sets in each frame")
@@ -210,29 +210,29 @@ def check_kept_text(step: Step, texts: Texts, cls: type[Node], resources: Mappin
 
 
 @lru_cache(maxsize=256)
-def _reached(text: str) -> tuple[set[str], set[str], list[tuple[str, set[str]]]]:
-    return reachable_names(text), set(_samplers(text)), list(_blocks(text))
+def _reached(text: str) -> tuple[set[str], set[str], list[tuple[str, str, set[str]]]]:
+    return reachable_names(text), set(declared_samplers(text)), list(declared_blocks(text))
 
 
 def _kept(step: Step, resources: Mapping[str, Resource]) -> str | None:
     return next((write.resource for write in step.writes if resources[write.resource].role == "kept"), None)
 
 
-def _blocks(text: str) -> Iterator[tuple[str, set[str]]]:
-    """Yield each uniform or storage block with the names of its members, or its instance (`block {…} instance`)."""
+def declared_blocks(text: str) -> Iterator[tuple[str, str, set[str]]]:
+    """Yield each `uniform` or storage (`buffer`) block with the names of its members, or its instance."""
     for before, body, own in re.findall(_BRACES, without_directives(text)):
         words = tokens(before)
         storage = next((at for at, word in enumerate(words) if word in ("uniform", "buffer")), None)
         if storage is not None and (name := head(words[storage:]).rest[:1]):
             members = {made for one, _ in statements(tokens(body)) for made, _, _ in declarators(head(one).rest[1:])}
-            yield name[0], members | ({own} if own else set())
+            yield words[storage], name[0], members | ({own} if own else set())
 
 
 @lru_cache(maxsize=256)
 def used_blocks(text: str) -> frozenset[str]:
     """Return the blocks of which `main` of a program text, or what it calls, uses a member."""
     names = reachable_names(text)
-    return frozenset(block for block, members in _blocks(text) if not names.isdisjoint(members))
+    return frozenset(block for _, block, members in declared_blocks(text) if not names.isdisjoint(members))
 
 
 def _placed(problem: Problem, text: StageText, names: Sequence[str]) -> Problem:

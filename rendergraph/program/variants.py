@@ -14,6 +14,15 @@ from rendergraph.scene.model import Material, Scene, Texture
 from rendergraph.scene.pack import PackedScene
 from rendergraph.steps import Step
 
+FIXED_BLOCKS = {
+    "camera_block": 0,
+    "frame_block": 1,
+    "light_block": 2,
+    "material_block": 3,
+    "material_uv_block": 4,
+    "environment_block": 5,
+}
+"""Binding points of the blocks the framework keeps; view tables follow."""
 LARGEST_BLOCK = 65536
 """Bytes that a uniform block holds on drivers for desktops; OpenGL promises 16384."""
 

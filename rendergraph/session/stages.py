@@ -145,6 +145,17 @@ def check(linked: Linked) -> Planned:
     return replace(planned, warnings=warnings)
 
 
+def check_profile(planned: Planned) -> None:
+    """Refuse what needs more than every OpenGL 4.5 driver offers (RG435)."""
+    from rendergraph.program.limits import beyond_guaranteed
+    from rendergraph.scene.pack import pack
+
+    types = {node.id: node.type for node in planned.linked.graph.nodes}
+    scene = planned.linked.scene
+    if problems := beyond_guaranteed(planned.plan, planned.expansion.views, types, scene, pack(scene)):
+        raise InputError(problems)
+
+
 def compile(expanded: Expanded, gpu: Gpu) -> Drawing:
     """Compile everything that a frame needs; a cached executable is used again if only uniforms differ.
 

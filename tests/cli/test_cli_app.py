@@ -337,3 +337,17 @@ def test_more_frames_than_anybody_waits_for_are_refused(cli: Any, frames: str) -
     found = cli("run", "forward", "--frames", frames, "-o", "a.####.png", "--size", "8x8")
     assert found.code == 2
     assert "frames exceed the limit of 100000 per run; render them in several runs" in found.err
+
+
+def test_check_against_the_guaranteed_limits(cli: Any, tmp_path: Path) -> None:
+    assert cli("check", "forward", "--profile", "guaranteed").code == 0
+    result = cli("check", "forward-msaa", "--profile", "guaranteed")
+    assert result.code == 3
+    assert (
+        "RG435 'light.radiance' has 4 samples per texel, which is more than a minimal OpenGL 4.5 device's 1"
+        in result.err
+    )
+    (tmp_path / "study.yaml").write_text("sweep: 1\npipeline: forward\naxes: {light.ambient: [0, 1]}\n")
+    result = cli("check", "study.yaml", "--profile", "guaranteed")
+    assert result.code == 2
+    assert "--profile checks a pipeline, not a sweep file" in result.err

@@ -114,7 +114,7 @@ class BoundedLater(Bounded):
 
 
 def test_depth_bounds_that_the_driver_lacks_are_an_error_or_passed_over(bench: Any) -> None:
-    if bench.session.device.has_depth_bounds:
+    if bench.session.device.limits["depth_bounds"]:
         assert (bench.draw(TEXT.replace("NAME", "bounded"), Bounded, shaders=SHADERS)["image"] == 0).all()
         return
     with pytest.raises(RendergraphError, match=r"RG435 node 'a' .*: its `State` has depth bounds, which this device"):
@@ -127,7 +127,7 @@ def test_depth_bounds_that_the_driver_lacks_are_an_error_or_passed_over(bench: A
 def test_depth_bounds_are_set_for_their_step_alone(bench: Any, monkeypatch: Any, cls: Any, bounds: Any) -> None:
     device, called = bench.session.device, []
     enable, disable = device.raw.glEnable, device.raw.glDisable
-    monkeypatch.setattr(device, "has_depth_bounds", True)
+    monkeypatch.setitem(device.limits, "depth_bounds", 1)
     monkeypatch.setattr(device.raw, "glDepthBoundsEXT", lambda *range: called.append(range), raising=False)
     for name, before in (("glEnable", enable), ("glDisable", disable)):
         monkeypatch.setattr(
