@@ -233,7 +233,7 @@ def _draw(
                 if not quiet:
                     emit(str(file.path))
             progress.show(done)
-            suspect = suspect or (frame if frame.is_suspect else None)
+            suspect = suspect or (frame if frame.unsound else None)
     progress.clear()
     for target in moving:
         written.append(str(target.path))

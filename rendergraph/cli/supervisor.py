@@ -22,6 +22,8 @@ _PR_SET_PDEATHSIG = 1
 
 def supervise() -> None:
     """Return in the worker, a new process, with signals that end it silently; called once, before there are threads."""
+    if sys.platform != "linux":
+        return  # no other system has sigtimedwait and prctl, and OpenGL 4.5 on EGL
     ending = {n for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if signal.getsignal(n) is not signal.SIG_IGN}
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_BLOCK, {*ending, signal.SIGCHLD})
@@ -32,10 +34,10 @@ def supervise() -> None:
     for number in ending:
         signal.signal(number, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {*ending, signal.SIGCHLD})
-    if sys.platform == "linux":
-        import ctypes  # takes 2 ms, in which Ctrl-C is already heard
+    import ctypes  # takes 2 ms, in which Ctrl-C is already heard
 
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    # A supervisor that is killed takes the worker with it.
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != supervisor:
         os._exit(1)
     activity.note("preparing")()

@@ -67,7 +67,7 @@ class FrameChunk(Task):
         frame = suspect = None
         for frame in stages.draw(expanded, worker.gpu, lead=self.lead):
             files = tuple(_encode(frame, file) for file in self.files)
-            suspect = suspect or (frame if frame.is_suspect else None)
+            suspect = suspect or (frame if frame.unsound else None)
             yield RenderedFrame(frame.number, files)
         assert frame is not None  # a chunk has one at least
         warnings = stages.not_finite_warnings(suspect, expanded, worker.gpu) if suspect else ()

@@ -74,6 +74,12 @@ def write_all(jobs: Sequence[Job], metadata: Mapping[str, str]) -> None:
 
 def picture_bytes(job: Job, metadata: Mapping[str, str]) -> bytes:
     """Return the bytes of the file that `write_all` would write; nothing is left behind where the process is killed."""
+    if not hasattr(os, "memfd_create"):
+        import tempfile  # where there is no memory that a library can write to
+
+        with tempfile.NamedTemporaryFile() as named:
+            _write_job(job, Path(named.name), metadata)
+            return named.read()
     with open(os.memfd_create("picture"), "rb") as file:
         _write_job(job, Path(f"/proc/self/fd/{file.fileno()}"), metadata)
         return file.read()

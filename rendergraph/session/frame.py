@@ -153,20 +153,16 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
 
         return summary([time.frame_ms for time in self.times])
 
-    @property
-    def is_suspect(self) -> bool:
-        """Whether an output holds NaN or infinity, or may have been made from NaN."""
-        return bool(self.unsound) or any(drawn_as_nan(a, self.infos[name].semantic) for name, a in self.arrays.items())
-
     @cached_property
     def unsound(self) -> Mapping[str, Problem]:
-        """A warning for each output that holds NaN or infinity."""
+        """A warning for each output that holds NaN or infinity, or is of 8 bits and shows the color of NaN."""
         warnings = {}
         for name, array in self.arrays.items():
-            if count := not_finite(array, self.infos[name].semantic):
-                port = "" if (port := self.infos[name].port) == name else f" ({port})"
-                text = f"{count} of {array.size // array.shape[-1]} pixels of '{name}'{port} are NaN or infinite"
-                text += "; run … --tap-all FOLDER shows where they begin"
+            semantic, port = self.infos[name].semantic, self.infos[name].port
+            if count := not_finite(array, semantic) or drawn_as_nan(array, semantic):
+                text = f"{count} of {array.size // array.shape[-1]} pixels of '{name}'"
+                text += f"{'' if port == name else f' ({port})'} are NaN or infinite"
+                text += " (drawn in magenta)" if array.dtype == "uint8" else ""
                 warnings[name] = Problem("RG619", text, Place(self.pipeline), severity="warning")
         return warnings
 

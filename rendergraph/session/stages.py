@@ -10,6 +10,7 @@ something is rendered.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -201,36 +202,27 @@ def not_finite_warnings(frame: Frame, expanded: Expanded, gpu: Gpu, camera: Came
 
     A suspect frame is rendered again with all ports tapped, so call this when no other frame is needed.
     """
-    import numpy as np  # for such frames alone
+    from rendergraph.session.frame import not_finite
 
-    from rendergraph.session.frame import drawn_as_nan, not_finite
-
-    if not frame.is_suspect:
+    if not frame.unsound:
         return []
     options = replace(expanded.options, warm_up=False, timed=False)
     taps = every_port(plan(expand(expanded.linked, options)))
-    try:
-        with gpu.current():
-            drawing = compile(expand(expanded.linked, replace(options, taps=taps)), gpu)
-            drawing.begin()
-            drawing.draw(frame.number, camera)
-            tapped = drawing.read()
-    except RendergraphError:  # the taps may need more memory than there is
-        return list(frame.unsound.values())
-    held = [tap for tap in taps if not_finite(tapped[tap], tapped.infos[tap].semantic)]
-    first = next((tap for tap in held if np.isnan(tapped[tap]).any()), held[0] if held else "")
-    if not first:
-        return list(frame.unsound.values())
-    found = []
-    for name, pixels in frame.arrays.items():
-        info = frame.infos[name]
-        if count := not_finite(pixels, info.semantic) or drawn_as_nan(pixels, info.semantic):
-            magenta = " (drawn in magenta)" if pixels.dtype == np.uint8 else ""
-            port = "" if info.port == name else f" ({info.port})"
-            text = f"{count} of {pixels.size // pixels.shape[-1]} pixels of '{name}'{port} are NaN or infinite{magenta}"
-            text += f"; the first texture with such texels is '{first}'; run … --tap-all FOLDER shows all textures"
-            found.append(Problem("RG619", text, Place(frame.pipeline), severity="warning"))
-    return found
+    held: list[str] = []
+    with contextlib.suppress(RendergraphError), gpu.current():  # the taps may need more memory than there is
+        drawing = compile(expand(expanded.linked, replace(options, taps=taps)), gpu)
+        drawing.begin()
+        drawing.draw(frame.number, camera)
+        tapped = drawing.read()
+        held = [tap for tap in taps if not_finite(tapped[tap], tapped.infos[tap].semantic)]
+        held = [tap for tap in held if (tapped[tap] != tapped[tap]).any()] or held  # NaN before infinity
+    way = "run … --tap-all FOLDER shows"
+    hint = f"; the first texture with such texels is '{held[0]}'; {way} all" if held else f"; {way} where they begin"
+    return [
+        problem.relocate(problem.place, hint=hint)
+        for name, problem in frame.unsound.items()
+        if held or frame[name].dtype != "uint8"  # else it is a color like any other
+    ]
 
 
 def draw_last(expanded: Expanded, gpu: Gpu, progress: Progress | None = None) -> Frame:

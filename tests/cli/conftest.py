@@ -90,7 +90,7 @@ class FakeFrame:
         self.metadata = {"pipeline": "nodes: {}\n"}
         self.number = number
         self.warnings: tuple[Any, ...] = ()
-        self.is_suspect = False
+        self.unsound: dict[str, Any] = {}
 
     def __getitem__(self, name: str) -> Any:
         return np.full((4, 6, 4), self.number / 10, np.float32)

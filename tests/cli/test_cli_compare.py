@@ -117,6 +117,8 @@ def test_nan_is_magenta_in_a_png_and_its_first_texture_is_named(cli: Any, tmp_pa
     magenta = (read(tmp_path / "a.png") == (255, 0, 255)).all(axis=-1)
     assert magenta[-3:, :4].all()
     assert magenta.sum() == 12
+    (tmp_path / "broken.frag").write_text(BROKEN.replace("vec4(0.5)", "vec4(1, 0, 1, 1)"))
+    assert "RG619" not in cli("run", "p.yaml", "--plugin", "broken.frag", "--tap", "a.shown=b.png", "-o", "a.png").err
 
 
 @pytest.mark.parametrize(
