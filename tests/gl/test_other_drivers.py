@@ -14,6 +14,8 @@ import numpy.typing as npt
 import pytest
 
 import rendergraph as rg
+from rendergraph.gl import programs
+from rendergraph.gl.device import Device
 from rendergraph.resources import shipped_pipelines
 from rendergraph.textures import TextureDesc
 
@@ -24,7 +26,9 @@ DRIVERS = {
     "zink": {"GALLIUM_DRIVER": "zink", "LIBGL_ALWAYS_SOFTWARE": "1"},
     "sse4.1": {"GALLIUM_OVERRIDE_CPU_CAPS": "sse4.1"},  # no fused multiply-add, vectors of half the width
     "zeros": {"glsl_zero_init": "true"},  # variables without a value are 0
+    "bare": {"MESA_EXTENSION_OVERRIDE": "-GL_EXT_depth_bounds_test -GL_EXT_memory_object -GL_EXT_memory_object_fd"},
 }
+IDENTICAL = {"zeros", "bare"}
 TIGHT, VISIBLE = 1e-4, 1.01 / 255
 TOLERANCES = {
     "depth": (1e-6, 0.0),
@@ -40,7 +44,6 @@ TOLERANCES = {
 }
 """How far the values of a port may differ on another device, by its semantic, and in what share of the texels by more."""
 RELATIVE = {"radiance", "luminance", "exposure_gain"}
-pytestmark = pytest.mark.slow
 
 
 def semantics(pipeline: rg.Pipeline) -> dict[str, str]:
@@ -76,6 +79,7 @@ def cases() -> Iterator[object]:
             yield pytest.param(driver, name, marks=() if fast else pytest.mark.nightly)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("driver", "name"), list(cases()))
 def test_ports_hold_the_same_values(gl: rg.Session, driver: str, name: str, tmp_path: Path) -> None:
     if driver == "zink" and not ICD.exists():
@@ -95,7 +99,7 @@ def test_ports_hold_the_same_values(gl: rg.Session, driver: str, name: str, tmp_
     wrong = []
     for port, ours in draw(name, gl).items():
         theirs = other[port]
-        if driver == "zeros":
+        if driver in IDENTICAL:
             wrong += [] if np.array_equal(ours, theirs, equal_nan=True) else [port]
             continue
         unit = 255.0 if ours.dtype == np.uint8 else 1.0
@@ -107,6 +111,24 @@ def test_ports_hold_the_same_values(gl: rg.Session, driver: str, name: str, tmp_
         beyond = (np.nan_to_num(abs(a - b) / scale) > bound).any(axis=-1).mean()
         wrong += [f"{port} ({kinds[port]}): {beyond:.2%} differ by more than {bound:.2g}"] if beyond > share else []
     assert not wrong
+
+
+def test_blocks_in_storage_hold_the_same_values(gl: rg.Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A device that may have few uniform blocks a stage, as zink over an old lavapipe is."""
+    stored: set[str] = set()
+    link = programs.link
+
+    def noted(device: Device, texts: Any, outputs: Any, blocks: Any) -> programs.Program:
+        stored.update(blocks)
+        return link(device, texts, outputs, blocks)
+
+    monkeypatch.setattr(programs, "link", noted)
+    pipeline = rg.load("forward", size=(32, 18))
+    with rg.Session() as session:
+        monkeypatch.setattr(session.device, "stores_blocks", True)
+        frame = session.render(pipeline)
+    assert {"light_block", "material_block"} <= stored
+    np.testing.assert_array_equal(frame["radiance"], gl.render(pipeline)["radiance"])
 
 
 if __name__ == "__main__":  # on the driver that the environment chooses: the pipeline, the file
