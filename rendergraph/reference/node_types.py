@@ -58,8 +58,8 @@ def _import_lines(node_type: NodeType) -> list[str]:
 def _input(name: str, port: Any) -> dict[str, Any]:
     if not hasattr(port, "use"):  # an InOut, which continues what is connected
         return _texture(name, port) | {"optional": port.optional, "continues": True}
-    keys = ("kind", "optional", "many", "size", "wrap", "compare", "anisotropy", "samples", "use", "doc")
-    facts = {"name": name, "semantic": port.semantic.name, "filter": _constant(port.filter)}
+    keys = ("kind", "optional", "many", "size", "wrap", "border", "compare", "anisotropy", "samples", "use", "doc")
+    facts = {"name": name, "semantic": port.semantic.name, "filter": _constant(port.filter), **_element(port)}
     return facts | {key: getattr(port, key) for key in keys}
 
 
@@ -82,9 +82,15 @@ def _carried(name: str, port: Any) -> dict[str, Any]:
     return {"name": name, "kind": port.kind, "semantic": semantic, "like": port.like, "doc": port.doc}
 
 
+def _element(port: Any) -> dict[str, Any]:
+    return {"element": port.element.name, "fields": dict(port.element.fields)} if port.element is not None else {}
+
+
 def _texture(name: str, port: Any) -> dict[str, Any]:
     facts = _carried(name, port)
-    if port.kind == "buffer":
+    if port.kind == "buffer" and port.element is not None:
+        facts |= {**_element(port), "count": _constant(port.count)}
+    elif port.kind == "buffer":
         facts["bytes"] = _constant(port.bytes)
     else:
         defaults = ("rgba16f", 1.0) if port.like is None else (None, None)
@@ -162,11 +168,13 @@ def input_facts(port: dict[str, Any]) -> list[str]:
         port.get("continues") and "continued",
         port.get("group") and f"in group {port['group']}",
         port["kind"] not in ("texture2d", port["semantic"]) and port["kind"],
+        "element" in port and f"elements {port['element']}",
         port.get("size") == "any" and "any size",
         {"depth_test": "for the depth test only", "image": "as an image"}.get(port.get("use", "")),
         {"multi": "multisampled", "any": "multisampled or not"}.get(port.get("samples", "")),
         {"nearest": "", _COMPUTED: "filter computed"}.get(port.get("filter", ""), port.get("filter")),
         port.get("wrap") != "clamp" and port.get("wrap"),
+        port.get("border") is not None and f"border value {format_value(port['border'])}",
         port.get("compare") and "compared",
         anisotropy > 1 and f"anisotropy {anisotropy}",
     ]
@@ -183,6 +191,7 @@ def output_facts(port: dict[str, Any]) -> list[str]:
         port.get("continues") and "continues the input of its name",
         *sizes,
         "bytes" in port and f"{port['bytes']} bytes",
+        "count" in port and f"{port['count']} elements {port['element']}",
         mips != 1 and ("all mips" if mips == 0 else f"{mips} mips"),
         *(f"{port[key]} {key}" for key in ("layers", "samples") if key in port),
         "clear" in port and f"cleared to {format_value(port['clear'])}",

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import pytest
 
+from rendergraph.api import Any as Anything
 from rendergraph.api import (
     Depth,
     DisplayColor,
@@ -17,6 +18,7 @@ from rendergraph.api import (
     InOut,
     Input,
     Internal,
+    Layout,
     Node,
     Output,
     Radiance,
@@ -159,6 +161,22 @@ def test_a_description_says_everything() -> None:
         "same": "",
         "lookup": "function, needs radiance, float shadow(int light, vec3 position, vec3 normal)",
     }
+
+
+class Sparks(Node):
+    """Buffers of elements, and a border of its own."""
+
+    before = Input(Anything, kind="buffer", element=Layout("Spark", {"age": "float"}), doc="In.")
+    mask = Input(Anything, wrap="border", border=(1.0, 0.0), doc="In.")
+    after = Output(Anything, kind="buffer", element=Layout("Spark", {"age": "float"}), count=64, doc="Out.")
+
+
+def test_elements_and_borders_are_described() -> None:
+    found = describe_node(Catalog.of(Sparks).get("sparks"))
+    facts = {port["name"]: ", ".join(input_facts(port)) for port in found["inputs"]}
+    assert facts == {"before": "buffer, elements Spark", "mask": "border, border value [1, 0]"}
+    assert [", ".join(output_facts(port)) for port in found["outputs"]] == ["buffer, 64 elements Spark"]
+    assert found["outputs"][0]["fields"] == {"age": "float"}
 
 
 class Cube(Node):
