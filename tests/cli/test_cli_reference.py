@@ -258,7 +258,7 @@ def test_what_needs_an_environment_is_shown_under_one_and_what_a_step_does_not_b
     shown = cli("explain", "forward_lighting", "--glsl").out  # the lighting, not the table that is made once
     assert "//   uniform sampler2D base_color_texture             the scene's materials" in shown
     assert (
-        "//   uniform sampler2DArray shadows_edges             nothing in this step, which has no use for it" in shown
+        "//   uniform sampler2DArray shadows_depth_ranges      nothing in this step, which has no use for it" in shown
     )
 
 
