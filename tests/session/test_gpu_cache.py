@@ -23,7 +23,7 @@ with rg.Session() as session:
     session.render(base.set("ao.samples", 8))
     before = resident()
     for number in range(200):
-        variant = base.set("ao.samples", 8 + number % 100).set("ao.thickness", 0.1 + number / 1000)
+        variant = base.set("ao.samples", 8 + number % 100).set("ao.contrast", number / 1000)
         session.render(variant)
     print(resident() - before)
 """
