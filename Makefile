@@ -51,17 +51,17 @@ pictures:
 	python docs/images/draw.py $(ONLY)
 
 test:
-	pytest -n $(WORKERS)
+	pytest -n $(WORKERS) --dist loadgroup
 
 # The fast tests, while working.
 quick:
-	pytest -n $(WORKERS) -m "not slow"
+	pytest -n $(WORKERS) --dist loadgroup -m "not slow"
 
 # What is slow by nature: every pipeline in every mode, long fuzzing, large references, a second driver.
 nightly:
 	pyright
 	sphinx-build -q -W --keep-going -D pictures=0 -b html docs docs/_build/html-nightly
-	pytest -n $(WORKERS) --nightly
+	pytest -n $(WORKERS) --dist loadgroup --nightly
 
 clean:
 	rm -rf build dist docs/_build docs/reference/generated .cache

@@ -40,11 +40,19 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--nightly", action="store_true", help="run only the tests that are slow by nature")
 
 
+SPREAD = {"test_docs", "test_registry", "test_modes", "test_cli_real"}
+"""Files with long tests that share nothing: with `--dist loadgroup` any process may run them, and they come last."""
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Run tests marked `nightly` with `--nightly`, all others without.
+    """Run tests marked `nightly` with `--nightly`, all others without, those that share fixtures in one process.
 
     `nightly(keep=2)` on a parametrised test leaves two of its cases in `make check`, spread over all of them.
     """
+    for item in items:
+        shares_page = {"browser", "served"} & set(getattr(item, "fixturenames", ()))
+        if shares_page or item.path.stem not in SPREAD:
+            item.add_marker(pytest.mark.xdist_group("page" if shares_page else item.path.stem))
     cases: dict[str, list[pytest.Item]] = {}
     for item in items:
         cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
