@@ -68,7 +68,8 @@ def pages() -> Iterator[tuple[str, str]]:
             *(_entry(name, getattr(module, name)) for name, module in names),
         ),
     )
-    members = {name: getattr(rendergraph.api, name) for name in rendergraph.api.__all__} | _GIVEN
+    own = {name: value for name, value in sorted(vars(rendergraph.api).items()) if name[0] != "_"}
+    members = {name: value for name, value in own.items() if not inspect.ismodule(value)} | _GIVEN
     ordered = sorted(members, key=lambda name: (FIRST.index(name) if name in FIRST else len(FIRST), name))
     documented = [name for name in ordered if callable(members[name]) or inspect.isclass(members[name])]
     meanings = [(code(n), prose(v.doc)) for n, v in members.items() if isinstance(v, Semantic | Signature)]

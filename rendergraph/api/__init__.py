@@ -1,129 +1,60 @@
 """The one module a node author imports."""
 
-from __future__ import annotations
-
-from rendergraph.declare import (
-    DROPPED,
-    Extension,
-    Facts,
-    Function,
-    History,
-    InOut,
-    Input,
-    Internal,
-    LightFacts,
-    MeshData,
-    Node,
-    ObjectFacts,
-    Output,
-    Part,
-    Port,
-    TextureInfo,
-    Views,
-    casting_lights,
-    define,
-    param,
-    structural,
-)
-from rendergraph.errors import SceneError
-from rendergraph.steps import (
-    ADD,
-    ALPHA,
-    MULTIPLY,
-    PREMULTIPLIED,
-    Blend,
-    Frame,
-    FrameScene,
-    State,
-    Stencil,
-    StencilFace,
-    Steps,
-    ViewMatrices,
-)
-from rendergraph.textures import (
-    Albedo,
-    Any,
-    Depth,
-    DisplayColor,
-    Emissive,
-    EnvironmentLight,
-    EnvironmentMap,
-    ExposureGain,
-    IrradianceSH,
-    Layout,
-    LinearDepth,
-    Luminance,
-    Material,
-    Normal,
-    Occlusion,
-    Radiance,
-    Semantic,
-    ShadowLookup,
-    ShadowMap,
-    Signature,
-    TextureDesc,
-    View,
-    Visibility,
-    full_mip_count,
-)
-
-__all__ = [
-    "ADD",
-    "ALPHA",
-    "DROPPED",
-    "MULTIPLY",
-    "PREMULTIPLIED",
-    "Albedo",
-    "Any",
-    "Blend",
-    "Depth",
-    "DisplayColor",
-    "Emissive",
-    "EnvironmentLight",
-    "EnvironmentMap",
-    "ExposureGain",
-    "Extension",
-    "Facts",
-    "Frame",
-    "FrameScene",
-    "Function",
-    "History",
-    "InOut",
-    "Input",
-    "Internal",
-    "IrradianceSH",
-    "Layout",
-    "LightFacts",
-    "LinearDepth",
-    "Luminance",
-    "Material",
-    "MeshData",
-    "Node",
-    "Normal",
-    "ObjectFacts",
-    "Occlusion",
-    "Output",
-    "Part",
-    "Port",
-    "Radiance",
-    "SceneError",
-    "Semantic",
-    "ShadowLookup",
-    "ShadowMap",
-    "Signature",
-    "State",
-    "Stencil",
-    "StencilFace",
-    "Steps",
-    "TextureDesc",
-    "TextureInfo",
-    "View",
-    "ViewMatrices",
-    "Views",
-    "Visibility",
-    "casting_lights",
-    "define",
-    "full_mip_count",
-    "param",
-    "structural",
-]
+from rendergraph.declare import DROPPED as DROPPED
+from rendergraph.declare import Extension as Extension
+from rendergraph.declare import Facts as Facts
+from rendergraph.declare import Function as Function
+from rendergraph.declare import History as History
+from rendergraph.declare import InOut as InOut
+from rendergraph.declare import Input as Input
+from rendergraph.declare import Internal as Internal
+from rendergraph.declare import LightFacts as LightFacts
+from rendergraph.declare import MeshData as MeshData
+from rendergraph.declare import Node as Node
+from rendergraph.declare import ObjectFacts as ObjectFacts
+from rendergraph.declare import Output as Output
+from rendergraph.declare import Part as Part
+from rendergraph.declare import Port as Port
+from rendergraph.declare import TextureInfo as TextureInfo
+from rendergraph.declare import Views as Views
+from rendergraph.declare import casting_lights as casting_lights
+from rendergraph.declare import define as define
+from rendergraph.declare import param as param
+from rendergraph.declare import structural as structural
+from rendergraph.errors import SceneError as SceneError
+from rendergraph.steps import ADD as ADD
+from rendergraph.steps import ALPHA as ALPHA
+from rendergraph.steps import MULTIPLY as MULTIPLY
+from rendergraph.steps import PREMULTIPLIED as PREMULTIPLIED
+from rendergraph.steps import Blend as Blend
+from rendergraph.steps import Frame as Frame
+from rendergraph.steps import FrameScene as FrameScene
+from rendergraph.steps import State as State
+from rendergraph.steps import Stencil as Stencil
+from rendergraph.steps import StencilFace as StencilFace
+from rendergraph.steps import Steps as Steps
+from rendergraph.steps import ViewMatrices as ViewMatrices
+from rendergraph.textures import Albedo as Albedo
+from rendergraph.textures import Any as Any
+from rendergraph.textures import Depth as Depth
+from rendergraph.textures import DisplayColor as DisplayColor
+from rendergraph.textures import Emissive as Emissive
+from rendergraph.textures import EnvironmentLight as EnvironmentLight
+from rendergraph.textures import EnvironmentMap as EnvironmentMap
+from rendergraph.textures import ExposureGain as ExposureGain
+from rendergraph.textures import IrradianceSH as IrradianceSH
+from rendergraph.textures import Layout as Layout
+from rendergraph.textures import LinearDepth as LinearDepth
+from rendergraph.textures import Luminance as Luminance
+from rendergraph.textures import Material as Material
+from rendergraph.textures import Normal as Normal
+from rendergraph.textures import Occlusion as Occlusion
+from rendergraph.textures import Radiance as Radiance
+from rendergraph.textures import Semantic as Semantic
+from rendergraph.textures import ShadowLookup as ShadowLookup
+from rendergraph.textures import ShadowMap as ShadowMap
+from rendergraph.textures import Signature as Signature
+from rendergraph.textures import TextureDesc as TextureDesc
+from rendergraph.textures import View as View
+from rendergraph.textures import Visibility as Visibility
+from rendergraph.textures import full_mip_count as full_mip_count

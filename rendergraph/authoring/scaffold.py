@@ -137,7 +137,7 @@ def _project_nodes(where: Path) -> tuple[str, bool]:
 def class_name(name: str) -> str:
     """Return `LensFalloff` for `lens_falloff`, or a longer name where plugin authors import that one."""
     camel = "".join(part.capitalize() for part in name.split("_"))
-    return f"{camel}Node" if camel in api.__all__ else camel
+    return f"{camel}Node" if hasattr(api, camel) else camel
 
 
 def _name_mistake(name: str, existing: Set[str]) -> str:
