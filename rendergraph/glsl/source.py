@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
 from rendergraph.glsl.files import MAX_BYTES, LineRun, Links, read_text, runs, strip_comments
-from rendergraph.glsl.names import mentions
+from rendergraph.glsl.names import declared, mentions
 from rendergraph.stamps import record_read
 
 MAX_DEPTH = 32
@@ -278,7 +278,8 @@ def find_old_names(source: SourceText, include_folder: Path) -> tuple[dict[str, 
         name, text = old.strip("<>.()"), strip_comments(read_text(file))
         pattern = re.escape(old).replace(r"\(\)", r"(?=\s*\()") + r"(?!\w)"
         match = re.search(r"(?<![\w.])" * (old[0] != ".") + pattern, text)
-        if match and (old[0] == "<" or name.startswith("v_") or mentions(shared, new)):
+        is_own = match and name in declared(text) and new in declared(shared)  # the file means its own function
+        if match and not is_own and (old[0] == "<" or name.startswith("v_") or mentions(shared, new)):
             macros |= {name: new} if old[0] != "<" else {}
             before = text[: match.start()].split("\n")
             place = Place(shown_file(file), len(before), len(before[-1]) + 1)

@@ -128,6 +128,15 @@ def test_a_node_may_call_methods_of_lighting_by_their_old_names(author: Any) -> 
     ]
 
 
+def test_a_function_of_ones_own_may_have_an_old_name(author: Any, gl: rg.Session) -> None:
+    author.node('color = Output(Radiance, doc="Colour.")')
+    own = "vec3 srgb(vec3 value) { return value + 2.0; }\n"
+    text = "out vec4 color;\nvoid main() { color = vec4(srgb(linear_to_srgb(vec3(1.0))), 1.0); }\n"
+    author.write(wrong__frag=f"#include <srgb.glsl>\n{own}{text}")
+    assert not any(problem.code == "RG449" for problem in author.pipeline().check().warnings)
+    assert np.allclose(gl.render(author.pipeline())["image"], [3, 3, 3, 1])
+
+
 def test_an_old_include_is_found(author: Any) -> None:
     text = "#include <{}>\nout vec4 color;\nvoid main() {{ color = linear_to_srgb(vec3(0.5)).rgbb; }}\n"
     author.node('color = Output(Radiance, doc="Colour.")')
