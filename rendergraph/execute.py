@@ -218,11 +218,11 @@ class Runner(Struct, eq=False):
                 node.node.update(frame)  # pyright: ignore[reportArgumentType]  # a cached_property is one to mypy
             updates[node.id] = perf_counter() - before
         stale = {key: values for key, values in executable.uploads.items() if values.is_stale}
+        if stale:
+            executable.computed(stale)  # noted before one of them may fail
         for key, values in stale.items():
             with _author_errors(self.graph[key[0]], "the function of an upload"):
                 values.compute()
-        if stale:
-            executable.computed(stale)
         executable.end_updates()
         if not self._complete:
             self._check_views()

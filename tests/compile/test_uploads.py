@@ -203,3 +203,41 @@ def test_an_edited_method_computes_again(author: Any, gl: rg.Session) -> None:
     author.write(edited__py=EDITED.format(20))
     again = rg.load(first.selection.source, plugins=first.selection.plugins)
     assert gl.render(again)["image"][0, 0, 0] == 20
+
+
+class Doubtful(Node):
+    """Two functions of the lights, of which the second may fail."""
+
+    color = Output(Radiance, format="rgba32f", doc="The height.")
+    table = Internal(kind="buffer", bytes=16)
+    other = Internal(kind="buffer", bytes=16)
+
+    def record(self, steps: Steps) -> None:
+        steps.upload(
+            self.table, lambda scene: np.full(4, scene.lights[0].position[1], np.float32), changes_with=["lights"]
+        )
+        steps.upload(self.other, self.fails_at_4, changes_with=["lights"])
+        steps.fullscreen("both.frag", out=self.color, table=self.table, other=self.other)
+
+    def fails_at_4(self, scene: FrameScene) -> Any:
+        height = scene.lights[0].position[1]
+        if height == 4 and "fail" in CALLS:
+            raise ArithmeticError
+        return np.full(4, height, np.float32)
+
+
+def test_a_function_that_fails_leaves_nothing_out_of_date(bench: Any, gl: rg.Session) -> None:
+    shader = "layout(std430) readonly buffer other { vec4 more; };" + TABLE_SHADER.replace("= value", "= value + more")
+    moving = SCENE + "keyframes: {lights.lamp.at: {0: [0, 3, 0], 1: [0, 4, 0], 2: [0, 4, 0]}}\n"
+    text = "nodes: {a: {type: doubtful}}\noutputs: {image: a.color}"
+    pipeline = bench.pipeline(text, Doubtful, shaders={"both.frag": shader}, scene=moving)
+    CALLS[:] = ["fail"]
+    with gl.current():
+        drawing = gl.compile(pipeline, fps=1.0)
+        drawing.begin()
+        drawing.draw(1)
+        with pytest.raises(InputError, match=r"RG433 .*failed in the function of an upload"):
+            drawing.draw(2)
+        CALLS.clear()
+        drawing.draw(2)
+        assert drawing.read()["image"][0, 0, 0] == 8
