@@ -172,8 +172,6 @@ def _about_param(parameter: Parameter, doc: str) -> str:
     return f"{doc}\n\nDefault {default}{unit}{limits}. {_ROLES[parameter.role]}"
 
 
-# --- is a file on disk still right? ----------------------------------------------------------------------------------
-
 _MODELINE = re.compile(r"#\s*(?:yaml-language-server:\s*)?\$schema=(\S+)\s*$", re.MULTILINE)
 _MOST_BYTES = 1 << 24
 

@@ -356,9 +356,6 @@ def _listed(names: list[str]) -> str:
     return quoted[0] if len(quoted) == 1 else f"{', '.join(quoted[:-1])} and {quoted[-1]}"
 
 
-# --- sizes and counts of the header as the rules that ports take -----------------------------------------------------
-
-
 def number_rule(value: Value) -> Ruled[int]:
     """A whole number, `all` for all mips (0), or the value of a structural parameter."""
     data = value.data

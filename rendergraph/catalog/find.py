@@ -46,9 +46,6 @@ _STEM = re.compile(r"[A-Za-z][A-Za-z0-9_-]*\Z")
 _HEAD_BYTES = 100_000
 
 
-# --- plugins of the project and of the environment -------------------------------------------------------------------
-
-
 class PluginPath(Struct, frozen=True):
     """A plugin by path, and where it is named: a settings file, or else in words."""
 
@@ -93,9 +90,6 @@ def _project(folder: Path) -> str:
     except (OSError, ValueError, KeyError, TypeError):
         return ""
     return plain(name) if isinstance(name, str) else ""
-
-
-# --- types -----------------------------------------------------------------------------------------------------------
 
 
 def package(plugin: str, package: str) -> Iterator[tuple[str, Listed]]:

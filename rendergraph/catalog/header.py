@@ -75,8 +75,6 @@ def _problem(name: str, lines: list[str], number: int, text: str) -> Problem:
     return Problem("RG440", text, Place(name, number + 1, column), line)
 
 
-# --- what keys take --------------------------------------------------------------------------------------------------
-
 _INPUT = word(_NAME, "the name of an input")
 _REFERENCE = word(re.compile(r"\$[A-Za-z]\w*\Z", re.ASCII), "$ and a parameter's name", "$name")
 _FACTOR: Any = number(0, 64, above=True) | _REFERENCE

@@ -77,9 +77,6 @@ def shader_folder(package: str) -> Path | None:
     return Path(next(iter(folders))) if folders else None
 
 
-# --- modules of folders ----------------------------------------------------------------------------------------------
-
-
 class _Loader(SourceFileLoader):
     """Compiles the source each time: compiled files are told apart by whole seconds, edits may be quicker."""
 

@@ -82,9 +82,6 @@ def _make(entries: Entries) -> _ShaderType:
     return _ShaderType(cls, tuple(entries.warnings(cls)), text)
 
 
-# --- what the node records -------------------------------------------------------------------------------------------
-
-
 def _fullscreen(entries: Entries) -> Record:
     file = entries.file.name
     ordered = entries.outputs_by_location()

@@ -78,8 +78,6 @@ class Reuse(Struct, eq=False, dict=True):
         positions, self._state = self._known[key]
         return positions
 
-    # Working it out ---------------------------------------------------------------------------------------------------
-
     def _chosen(self, state: _State, changed: frozenset[Source]) -> tuple[tuple[int, ...], _State]:
         stale = self._stale(changed)
         held: dict[_Slot, Value] = {

@@ -50,8 +50,6 @@ class Recording:
         self.uniforms = param_uniforms(node.node)
         self.includes = tuple([(name.upper(), file) for name, file in node.choices.items()])
 
-    # What `steps.Recorder` promises to nodes ------------------------------------------------------------------------
-
     @property
     def facts(self) -> Facts:
         return self._facts

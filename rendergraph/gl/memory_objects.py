@@ -80,8 +80,6 @@ def _block(device: Device, vulkan: Vulkan, descs: Sequence[TextureDesc]) -> Memo
     return block
 
 
-# --- Vulkan -----------------------------------------------------------------------------------------------------------
-
 _FORMATS = {
     "r8": 9, "rg8": 16, "rgba8": 37, "srgb8_a8": 43, "r16": 70, "rg16": 77, "rgba16": 91, "rgb10_a2": 64,
     "rgba16_snorm": 92, "r16f": 76, "rg16f": 83, "rgba16f": 97, "r11f_g11f_b10f": 122, "r32f": 100, "rg32f": 103,

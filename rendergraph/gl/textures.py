@@ -339,8 +339,6 @@ def poison_value(format_name: str) -> float:
     return {"uint": float(0x7FFFFFFF), "int": float(0x7FFFFFFF)}.get(family, 0.7319)
 
 
-# --- samplers --------------------------------------------------------------------------------------------------------
-
 _FILTERS = {
     "nearest": 0x2600, "linear": 0x2601, "nearest_mipmap_nearest": 0x2700, "linear_mipmap_nearest": 0x2701,
     "nearest_mipmap_linear": 0x2702, "linear_mipmap_linear": 0x2703,

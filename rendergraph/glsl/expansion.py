@@ -52,9 +52,6 @@ def _error(source: SourceText, at: int, text: str) -> InputError:
     return InputError(Problem("RG409", text, origin.place(), source.lines[at] if origin == source.origins[at] else ""))
 
 
-# --- reading ---------------------------------------------------------------------------------------------------------
-
-
 class _Definition(Struct, frozen=True):
     name: str
     parameters: tuple[str, ...] | None
@@ -91,9 +88,6 @@ def _joined(source: SourceText) -> Iterator[tuple[str, int]]:
         text = ""
     if text:
         yield text, start
-
-
-# --- weighing --------------------------------------------------------------------------------------------------------
 
 
 class _Growth(Struct, frozen=True):

@@ -99,8 +99,6 @@ def _at(word: str) -> int:
     return word.at if isinstance(word, Token) else 0
 
 
-# --- literals ---------------------------------------------------------------------------------------------------------
-
 Literal: TypeAlias = "bool | int | float | tuple[float, ...]"
 """A scalar, or a vector's components."""
 

@@ -117,9 +117,6 @@ def renamed(text: str, rename: Callable[[str], str]) -> str:
     return re.sub(r"(?<![\w.])[A-Za-z_]\w*", replace, text)
 
 
-# --- scanning --------------------------------------------------------------------------------------------------------
-
-
 def statements(words: Sequence[str]) -> Iterator[tuple[list[str], Sequence[str] | None]]:
     """Yield top-level statements, each with the tokens inside its braces, if any.
 

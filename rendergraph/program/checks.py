@@ -75,9 +75,6 @@ def _check_step(
     return tuple(warning for text in texts.values() for warning in text.warnings)
 
 
-# --- samplers --------------------------------------------------------------------------------------------------------
-
-
 def sampler_of(read: Read, resource: Resource) -> str:
     """Return the GLSL sampler type of a read: `usampler2D`, `sampler2DArrayShadow`, `sampler2DMS`."""
     assert isinstance(resource.desc, TextureDesc)
@@ -182,9 +179,6 @@ def declared_samplers(text: str) -> dict[str, list[str]]:
         for name in re.findall(_NAME, names):
             found.setdefault(name, []).append(kind)
     return found
-
-
-# --- persistent values ------------------------------------------------------------------------------------------------
 
 
 def check_kept_text(step: Step, texts: Texts, cls: type[Node], resources: Mapping[str, Resource]) -> None:

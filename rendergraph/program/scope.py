@@ -236,9 +236,6 @@ def _file(file: Path | None) -> str:
     return file.relative_to(shared).as_posix() if file.is_relative_to(shared) else shown_file(file)
 
 
-# --- the text --------------------------------------------------------------------------------------------------------
-
-
 def annotated(text: StageText) -> str:
     """Return a stage's text with a comment before each run of lines that names its file; it compiles as before."""
     found: list[str] = []

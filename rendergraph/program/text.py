@@ -156,9 +156,6 @@ class StepTexts(Struct, eq=False):
         return {stage: replace(text, node=step.node) for stage, text in texts.items()}
 
 
-# --- one stage -------------------------------------------------------------------------------------------------------
-
-
 class _Program(Struct, frozen=True):
     """A step with what its program text depends on, as in `stage_texts`."""
 
@@ -318,9 +315,6 @@ def _read_declarations(reads: Iterable[Read], resources: Mapping[str, Resource],
             line = f"const int {name}_lights[{len(resource.lights)}] = int[]({table});"
             text += generated([line], f"the lights of '{read.name}'")
     return text
-
-
-# --- functions -------------------------------------------------------------------------------------------------------
 
 
 def signatures_of(step: Step, types: Mapping[str, NodeType]) -> dict[str, Signature]:
