@@ -19,11 +19,12 @@ from rendergraph.resources import folder
 
 SMALL = ("--size", "64x36")
 QUICK = (*SMALL, "-s", "sun.resolution=128")
+ROUGH = (*QUICK, "-s", "environment.size=16")
 SMALLEST = {  # what is added to the examples of a verb: of options that are given twice the last one counts
-    "run": (*QUICK, "--executor", "serial"),  # compare/test_executors.py has the other executors
-    "bench": (*QUICK, "-n", "2"),
+    "run": (*ROUGH, "--executor", "serial"),  # compare/test_executors.py has the other executors
+    "bench": (*ROUGH, "-n", "2"),
     "compare": (*QUICK, "-n", "1"),
-    "sweep": (*QUICK, "-n", "1", "--executor", "serial"),
+    "sweep": (*ROUGH, "-n", "1", "--executor", "serial"),
 }
 
 

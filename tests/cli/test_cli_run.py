@@ -233,7 +233,7 @@ def test_an_empty_word_is_no_path_and_a_root_is_a_folder(
 @pytest.mark.slow
 def test_names_of_any_bytes_are_names(cli: Any) -> None:
     name = "a\udcff"
-    small = ("--size", "8x8", "-s", "sun.resolution=64", "-n", "1")
+    small = ("--size", "8x8", "-s", "sun.resolution=64", "-s", "environment.size=16", "-n", "1")
     assert cli("sweep", "forward", "-x", "shadows.taps=1", *small, "-o", name).code == 0
     assert (
         cli("sweep", "forward", "-x", "shadows.taps=1", *small, "-o", name, "--resume", "--json").json["resumed"] == 1

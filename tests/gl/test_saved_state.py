@@ -398,7 +398,9 @@ def pictures(tmp_path: Path) -> dict[str, rg.Pipeline]:
 FORWARD = rg.load("forward", size=(40, 24))
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 8))])
+@pytest.mark.slow
+@pytest.mark.nightly(keep=3)
+@pytest.mark.parametrize("seed", range(8))
 def test_the_owners_state_changes_no_picture_and_is_found_again(
     seed: int, gl: rg.Session, borrowed: tuple[rg.Session, Owner], pictures: dict[str, rg.Pipeline]
 ) -> None:

@@ -227,14 +227,16 @@ def mutants(value: Any) -> list[Any]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["scene", "sweep"])
-def test_shipped_files_are_valid_and_mutants_are_as_the_walk_says(kind: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "most"), [("scene", 30), ("sweep", 100), pytest.param("scene", 300, marks=pytest.mark.nightly)]
+)
+def test_shipped_files_are_valid_and_mutants_are_as_the_walk_says(kind: str, most: int) -> None:
     table, validate, checked = table_of(kind), compiled(kind), 0
     for text in files(kind):
         data = parse(text).root.plain()
         assert accepts(validate, data)
         found = mutants(data)
-        for mutant in found[:: len(found) // 100 + 1]:
+        for mutant in found[:: len(found) // most + 1]:
             validator = Validator(CODES)
             validator.file(from_plain(mutant, Source("mutant")), table, "keys")
             checked += 1

@@ -56,8 +56,12 @@ def test_docs_are_sentences(name: str) -> None:
     assert list(doc_problems(CATALOG.get(name).cls)) == []
 
 
+ALIKE = {"forward_multipass", "forward_shadow_volumes", "deferred_stencil_lights", "weighted_blended", "depth_peeling"}
+"""Lighting nodes with the variants of `forward_lighting` and `deferred_lighting`, which take a tenth of the tests' time."""
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", BUILTIN)
+@pytest.mark.parametrize("name", [name for name in BUILTIN if name not in ALIKE])
 def test_every_variant_compiles_and_the_default_passes_check_node(name: str) -> None:
     """Uniforms as declared, everything written, nothing else touched or left behind."""
     assert examine(CATALOG.get(name), renders=lambda variant: not variant.name).mistakes == ()
