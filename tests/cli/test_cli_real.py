@@ -166,7 +166,7 @@ def test_all_ports_become_pictures_in_order_and_a_sheet_of_them(cli: Any, tmp_pa
     assert names[-1] == "contact.png"
     ports = [name.partition("-")[2].removesuffix(".png") for name in names[:-1]]
     assert ports.index("sun.shadow_map") < ports.index("shadows.visibility") < ports.index("light.radiance")
-    assert ports[-4:] == ["bloom.across", "bloom.glow", "bloom.radiance", "display.color"]
+    assert ports[-4:] == ["bloom.blurred_x", "bloom.glow", "bloom.radiance", "display.color"]
     assert sorted(path.name for path in (tmp_path / "a/inside").iterdir()) == sorted(names)
     assert images.read(f"a/inside/{names[ports.index('light.radiance')]}").shape == (36, 64, 3)
     assert images.read("a/inside/contact.png").max() > 0.9
