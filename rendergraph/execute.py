@@ -107,7 +107,7 @@ class FrameContext(Struct, eq=False):
             region.set(scissor, depth_bounds)
 
     def write(self, port: Port, values: npt.NDArray[Any]) -> None:
-        buffer_of(declared_port(self.node.node.ports(), port, "write"), "write")
+        buffer_of(self.node.node.ports(), port, "write")
         name = f"{self.node.id}.{port.name}"
         if name not in self.executable.plan.placement:
             return  # nobody reads the buffer in this pipeline

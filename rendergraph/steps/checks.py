@@ -210,7 +210,7 @@ def attributes(ports: Mapping[str, Port], value: Mapping[str, Port] | None) -> d
             raise Misuse(f"attributes has the layout {quoted(layout)}; {example}")
         if wanted != len(names):
             raise Misuse(f"attributes has the layout {quoted(layout)}: {wanted} formats, {len(names)} names; {example}")
-        found[layout] = buffer(declared_port(ports, port, f"attributes[{layout!r}]"), f"attributes[{layout!r}]")
+        found[layout] = buffer(ports, port, f"attributes[{layout!r}]")
     return found
 
 
@@ -219,10 +219,13 @@ def unconnected(port: Port) -> Misuse:
     return Misuse(f"input '{port.name}' is not connected; ask `steps.connected` first")
 
 
-def buffer(port: Port, what: str) -> Port:
-    """Return a port after checking that it is a buffer."""
+def buffer(ports: Mapping[str, Port], value: object, what: str) -> Port:
+    """Return a port after checking that it is a buffer of the node."""
+    port = declared_port(ports, value, what)
     if getattr(port, "kind", "") != "buffer":
         raise Misuse(f"{what} is {quoted(port)}, which is not a buffer")
+    if isinstance(value, Part):
+        raise Misuse(f"{what} is a part of '{port.name}'; give the port itself, only shaders read last frame's values")
     return port
 
 

@@ -137,11 +137,11 @@ class Steps:
             raise Misuse(f"'{own.name}' holds no texture; its description has no size or format")
         return found
 
-    def _check_buffers(self, **arguments: object) -> None:
-        for name, port in arguments.items():
-            if isinstance(port, Port):
-                checks.buffer(checks.declared_port(self.ports, port, name), name)
-                self._connected(port)
+    def _check_buffer(self, name: str, value: object, least: int = 0) -> None:
+        port = checks.buffer(self.ports, value, name)
+        self._connected(port)
+        if isinstance(desc := self._desc(port), BufferDesc) and desc.bytes < least:
+            raise Misuse(f"{name} reads {least} bytes of '{port.name}', which holds {desc.bytes}")
 
     def _connected(self, port: Port) -> None:
         if isinstance(port, Input) and not self.facts.connected(port.name):
@@ -264,9 +264,12 @@ class Steps:
             out, state, region, defines, label, bindings: see the class.
             view, view_index: as for `geometry`.
         """
-        if not isinstance(vertices, Port):
+        if isinstance(vertices, Port | Part):
+            self._check_buffer("vertices", vertices, 20 * (command + commands) - (4 if indices is None else 0))
+        else:
             checks.check_argument("vertices", vertices, Count)
-        self._check_buffers(vertices=vertices, indices=indices)
+        if indices is not None:
+            self._check_buffer("indices", indices)
         buffers = checks.attributes(self.ports, attributes)
         for port in buffers.values():
             self._connected(port)
@@ -303,7 +306,8 @@ class Steps:
         """
         if groups is not None and over is not None:
             raise Misuse("both over and groups are given; over finds the number of groups itself")
-        self._check_buffers(groups=groups)
+        if isinstance(groups, Port | Part):
+            self._check_buffer("groups", groups, 12 * (command + 1))
         options: dict[str, Any] = {"over": over}
         if groups is not None:
             given = groups if isinstance(groups, Port) else checks.counts("groups", groups)
