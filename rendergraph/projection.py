@@ -309,7 +309,7 @@ def frustum_corners(view: ViewMatrices, near: float | None = None, far: float | 
     """
     near, far = view.near if near is None else near, view.far if far is None else far
     if math.isinf(far):
-        raise ValueError("the view reaches to infinity; say how far the corners are")
+        raise ValueError("the view reaches to infinity; give the distance of the far corners")
     inverse = np.linalg.inv(view.projection @ view.view)
     corners = []
     for distance in (near, far):

@@ -150,7 +150,7 @@ def test_a_part_of_a_frustum_lies_between_its_distances() -> None:
 
 
 def test_an_endless_frustum_has_no_far_corners() -> None:
-    with pytest.raises(ValueError, match="the view reaches to infinity; say how far"):
+    with pytest.raises(ValueError, match="the view reaches to infinity; give the distance"):
         projection.frustum_corners(camera(far=math.inf))
 
 

@@ -101,7 +101,7 @@ def _compute(entries: Entries) -> Record:
     file = entries.file.name
     local = tuple(_local_size(entries, f"local_size_{axis}") for axis in "xyz")
     if not any(f"local_size_{axis}" in entries.globals.input_layout for axis in "xyz"):
-        text = "a compute shader says how many threads a group has: layout(local_size_x = 8, local_size_y = 8) in;"
+        text = "a compute shader declares the size of its work groups: layout(local_size_x = 8, local_size_y = 8) in;"
         entries.report("RG443", text)
     threads = _threads(entries)
     outputs = [name for name, port in entries.ports.items() if isinstance(port, WrittenPort)]

@@ -201,19 +201,17 @@ def _table(table: Table) -> Schema:
 
 
 def _properties(keys: tuple[Key, ...]) -> Schema:
-    return {key.name: _key_schema(key) for key in keys}
-
-
-def _key_schema(key: Key) -> Schema:
-    values = schema(key.type)
-    default = list(key.default) if isinstance(key.default, tuple) else key.default
-    about = key.doc
-    if default is not None:
-        about += f"\n\nDefault {json.dumps(default, ensure_ascii=False)}{' ' if key.unit else ''}{key.unit}."
-    elif key.unit:
-        about += f"\n\nin {key.unit}."
-    found = {**(values if key.required else nullable(values)), "description": about}
-    return found if default is None else {**found, "default": default}
+    found: dict[str, Schema] = {}
+    for key in keys:
+        values, about = schema(key.type), key.doc
+        if key.default is not None:
+            about += f"\n\nDefault {json.dumps(key.default, ensure_ascii=False)}{' ' if key.unit else ''}{key.unit}."
+        elif key.unit:
+            about += f"\n\nin {key.unit}."
+        found[key.name] = {**(values if key.required else nullable(values)), "description": about}
+        if key.default is not None:
+            found[key.name]["default"] = list(key.default) if isinstance(key.default, tuple) else key.default
+    return found
 
 
 def nullable(values: Schema) -> Schema:

@@ -44,9 +44,8 @@ class Validator:
         self.dropped: set[tuple[str, ...]] = set()
         self._has_broken = bool(self.problems)
         self._path: list[str] = []
-        self._checks: dict[
-            int, tuple[Callable[[Any], bool], Callable[[Any], Any]]
-        ] = {}  # by identity, because hashing an annotation takes long
+        # By identity, because hashing an annotation takes long.
+        self._checks: dict[int, tuple[Callable[[Any], bool], Callable[[Any], Any]]] = {}
 
     def report(self, value: Value, code: str, text: str, *, key: bool = False) -> None:
         """Note a mistake at a value, or at its key."""
@@ -70,15 +69,12 @@ class Validator:
         data = value.data
         if isinstance(type, Recursive):
             type = type.table() if isinstance(data, dict) else type.type
-        if isinstance(type, Table):
-            if isinstance(data, dict):
-                return self._table(value, type, name)
-            expected, hint = "a mapping", ""
-        elif isinstance(type, MapOf):
-            if isinstance(data, dict) and len(data) >= type.least:
-                return self._map(value, key, type)
-            expected, hint = "a mapping", ""
-        else:
+        if isinstance(type, Table) and isinstance(data, dict):
+            return self._table(value, type, name)
+        if isinstance(type, MapOf) and isinstance(data, dict) and len(data) >= type.least:
+            return self._map(value, key, type)
+        expected, hint = "a mapping", ""
+        if not isinstance(type, Table | MapOf):
             if self._has_broken and _is_broken(value):
                 return None
             plain = value.plain() if isinstance(data, list | dict) else data

@@ -327,7 +327,7 @@ def test_a_banner_is_no_header(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("layout(r32f) uniform image2D a;", "1:1: RG443 a compute shader says how many threads a group has"),
+        ("layout(r32f) uniform image2D a;", "1:1: RG443 a compute shader declares the size of its work groups"),
         (
             "layout(local_size_x = N) in;\nlayout(r32f) uniform image2D a;",
             "1:1: RG443 local_size_x: 'N' is neither a number nor a macro that is one; write a number",
