@@ -14,8 +14,7 @@ from rendergraph.errors import Problem, UsageError
 
 if TYPE_CHECKING:
     from rendergraph.compare import Sweep
-    from rendergraph.compare.sweepfile import SweepFile
-    from rendergraph.session import Pipeline
+    from rendergraph.compare.prepare import Prepared
 
 
 RUNS = options.Parsed("N,A-B", "rendergraph.compare.export.openjd:parse_numbers")
@@ -62,6 +61,8 @@ def command(
       rendergraph farm measure study.yaml --runs 1-2 -o study
       rendergraph farm frames study.yaml --runs 2 --frames 3-4 -o study
     """
+    from rendergraph.compare import SweepOptions
+    from rendergraph.compare.prepare import prepare
     from rendergraph.compare.sweepfile import read_sweep
     from rendergraph.session import Pipeline, Selection
 
@@ -69,10 +70,11 @@ def command(
     with at_its_lines(file):
         select = with_file(file, Selection)
         base, reference = Pipeline(select(file.pipeline)), shared.load_reference(file.reference, select)
+        how = SweepOptions(**{**file.options, "kept": "all"}, device=device)
         if action == "export":
             if not openjd:
                 raise UsageError(Problem("RG500", "farm export needs the kind of job: --openjd"))
-            job = _template(base, reference, file, sweep, out.parent, frames, chunk)
+            job = _template(prepare(base, file.space, Path(), reference, how), sweep, out.parent, frames, chunk)
             options.put(job, out, as_json=as_json)
             return
         if runs is None:
@@ -80,12 +82,11 @@ def command(
         if (most := max(runs)) > (count := len(file.space.runs())):
             raise UsageError(Problem("RG500", f"--runs: there is no run {most}; the sweep has {amount(count, 'run')}"))
         only = sorted(number - 1 for number in runs)
+        how = how.replace(only=only)
         if action == "measure":
-            from rendergraph.compare import SweepOptions
             from rendergraph.compare.export.shards import measure
 
-            how = SweepOptions(**{**file.options, "kept": "all"}, device=device)
-            _report(measure(base, file.space, out, reference, only, how), out, len(only), as_json=as_json)
+            _report(measure(base, file.space, out, reference, how), out, len(only), as_json=as_json)
         elif frames is None:
             raise UsageError(Problem("RG500", "farm frames needs --frames, such as --frames 1-24"))
         else:
@@ -94,7 +95,7 @@ def command(
 
             paths = []
             with Gpu(device) as gpu:
-                for path in render_frames(base, file.space, out, only, frames, gpu, metric=file.options.get("metric")):
+                for path in render_frames(base, file.space, out, how, frames, gpu):
                     paths.append(str(path))
                     if not as_json:
                         emit(str(path))
@@ -115,26 +116,16 @@ def _report(sweep: Sweep | None, out: Path, count: int, *, as_json: bool) -> Non
         say(f"{failure.name} failed: {failure.text}", always=True)
 
 
-def _template(
-    base: Pipeline,
-    reference: Path | Pipeline | None,
-    file: SweepFile,
-    sweep: Path,
-    folder: Path,
-    frames: range | None,
-    chunk: int,
-) -> str:
+def _template(prepared: Prepared, sweep: Path, folder: Path, frames: range | None, chunk: int) -> str:
     import yaml  # for this action alone
 
     from rendergraph.compare.export.openjd import template
-    from rendergraph.compare.prepare import prepare
     from rendergraph.compare.runner import list_sweep
 
     class Plain(yaml.SafeDumper):
         def ignore_aliases(self, data: Any) -> bool:
             return True
 
-    prepared = prepare(base, file.space, Path(), reference, metric=file.options.get("metric"))
     resources = (resource for run in prepared.runs for resource in run.planned.plan.resources.values())
     if frames is not None and any(resource.role == "history" for resource in resources):
         say(f"each frame depends on earlier ones, so a task renders all frames of its run: {len(frames)}")

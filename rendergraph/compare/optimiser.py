@@ -196,7 +196,7 @@ def check_search(
             problems.append(Problem("RG524", text))
     if problems:
         raise InputError(problems)
-    return prepare(base, replace(space, chosen=tuple(_ends(space))), Path(), reference, metric=metric)
+    return prepare(base, replace(space, chosen=tuple(_ends(space))), Path(), reference, SweepOptions(metric=metric))
 
 
 def _ends(space: Space) -> Iterator[dict[str, str]]:

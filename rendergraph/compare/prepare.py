@@ -228,10 +228,8 @@ def prepare(
     out: Path,
     reference: Path | Pipeline | None = None,
     options: SweepOptions = SweepOptions(),
-    **settings: Any,
 ) -> Prepared:
     """Plan the runs of a sweep, with the arguments of `sweep`."""
-    options = options.replace(**settings)
     space = Space.of(axes)
     space.check()
     combinations = space.runs()

@@ -369,11 +369,8 @@ class Listing:
         }
 
 
-def list_sweep(
-    prepared: Prepared, out: Path | None = None, options: SweepOptions = SweepOptions(), **settings: Any
-) -> Listing:
+def list_sweep(prepared: Prepared, out: Path | None = None, options: SweepOptions = SweepOptions()) -> Listing:
     """Return what `sweep` would render into a folder; without one, no run is complete."""
-    options = options.replace(**settings)
     numbers = range(len(prepared.runs))
     kept: frozenset[int] = frozenset()
     if out is not None:

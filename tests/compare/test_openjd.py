@@ -20,7 +20,7 @@ from rendergraph.cli.app import main
 from rendergraph.compare.engine import sweep
 from rendergraph.compare.export.openjd import numbers_text, parse_numbers, template
 from rendergraph.compare.export.shards import measure, render_frames
-from rendergraph.compare.prepare import prepare
+from rendergraph.compare.prepare import SweepOptions, prepare
 from rendergraph.compare.runner import list_sweep
 from rendergraph.compare.store import ResultsLog
 from rendergraph.errors import InputError
@@ -70,7 +70,7 @@ def test_parts_are_the_whole(gl: rg.Session, tmp_path: Path, against: str | None
     whole = sweep(drawn, AXES, tmp_path / "whole", reference, frames=1, session=gl)
     out = tmp_path / "out"
     for only in ([3, 4], [0, 2], [1], [0, 2]):
-        measure(drawn, AXES, out, reference, only, frames=1, session=gl)
+        measure(drawn, AXES, out, reference, SweepOptions(only=only, frames=1, session=gl))
     assert not (out / "results.jsonl").exists()
     gathered = sweep(drawn, AXES, out, reference, frames=1, session=gl, resume=True)
     assert (gathered.resumed, gathered.executed) == (5, 0)
@@ -82,13 +82,13 @@ def test_parts_are_the_whole(gl: rg.Session, tmp_path: Path, against: str | None
         for folder in ("whole", "out")
     ]
     assert keys[0] == keys[1]
-    assert measure(drawn, AXES, out, reference, [0, 2], frames=1, session=gl) is None  # it is there
+    assert measure(drawn, AXES, out, reference, SweepOptions(only=[0, 2], frames=1, session=gl)) is None  # it is there
 
 
 def test_frames_are_the_same_in_every_chunk(gl: rg.Session, tmp_path: Path) -> None:
     drawn = base(tmp_path)
     for frames in (range(1, 3), range(3, 5)):
-        list(render_frames(drawn, AXES, tmp_path / "out", [1], frames, gl))
+        list(render_frames(drawn, AXES, tmp_path / "out", SweepOptions(only=[1]), frames, gl))
     expected = gl.frames(drawn.set("a.gain", 0.3), frames=range(1, 5))
     for number, frame in enumerate(expected, 1):
         found = read(tmp_path / "out" / "a.gain=0.3" / "frames" / f"radiance.{number:04d}.exr")

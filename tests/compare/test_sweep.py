@@ -17,7 +17,7 @@ from rendergraph.cli.compare import summary
 from rendergraph.compare.batches import batches
 from rendergraph.compare.engine import sweep
 from rendergraph.compare.export.table import csv_text
-from rendergraph.compare.prepare import prepare
+from rendergraph.compare.prepare import SweepOptions, prepare
 from rendergraph.compare.report import sweep_page
 from rendergraph.compare.results import pareto
 from rendergraph.compare.runner import list_sweep
@@ -196,7 +196,7 @@ def test_what_would_be_drawn_is_listed_and_nothing_is(gl: rg.Session, tmp_path: 
     out, base = tmp_path / "out", bad(tmp_path)
 
     def told(values: str, **options: Any) -> tuple[list[Any], int, set[str]]:
-        found = list_sweep(prepare(base, [f"a.mode={values}"], out), out, frames=1, **options).as_json()
+        found = list_sweep(prepare(base, [f"a.mode={values}"], out), out, SweepOptions(frames=1, **options)).as_json()
         return [run["group"] for run in found["runs"]], found["kept"], {run["name"] for run in found["runs"]}
 
     assert told("1,2") == ([1, 1], 0, {"a.mode=1", "a.mode=2"})

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rendergraph.compare.engine import Sweep, sweep
 from rendergraph.compare.export.openjd import numbers_text
@@ -24,23 +24,18 @@ _PRIVATE = ".parts"
 
 
 def measure(
-    base: Pipeline,
-    axes: Axes,
-    out: Path,
-    reference: Path | Pipeline | None,
-    only: Sequence[int],
-    options: SweepOptions = SweepOptions(),
-    **settings: Any,
+    base: Pipeline, axes: Axes, out: Path, reference: Path | Pipeline | None, options: SweepOptions
 ) -> Sweep | None:
-    """Render and measure some runs of a sweep, while other workers may do others in the same folder.
+    """Render and measure `only` some runs of a sweep, while other workers may do others in the same folder.
 
     They stay in a private folder until they are complete, so that they can be started again at any time. Nothing is
-    added to `results.jsonl`, which has a single writer. The arguments are those of `sweep`, and the numbers of the
-    runs, from 0. Returns None if all runs were complete already.
+    added to `results.jsonl`, which has a single writer. The arguments are those of `sweep`.
+    Returns None if all runs were complete already.
     """
-    options = options.replace(**settings, only=only)
     runs = prepare(base, axes, out, reference, options).runs
-    waiting = [number for number, run in zip(only, runs, strict=True) if not is_complete(run, {}, options)]
+    waiting = [
+        number for number, run in zip(options.only or (), runs, strict=True) if not is_complete(run, {}, options)
+    ]
     if not waiting:
         return None
     private = out / _PRIVATE / numbers_text(waiting)
@@ -63,7 +58,7 @@ def _move(run: Path, to: Path) -> None:
 
 
 def render_frames(
-    base: Pipeline, axes: Axes, out: Path, only: Sequence[int], frames: range, gpu: Gpu, *, metric: str | None = None
+    base: Pipeline, axes: Axes, out: Path, options: SweepOptions, frames: range, gpu: Gpu
 ) -> Iterator[Path]:
     """Render frames of some runs into their folders, `frames/image.0001.png`, and yield each file's path.
 
@@ -72,13 +67,13 @@ def render_frames(
     from rendergraph.images import Saved, numbered, save_outputs  # exporting a job needs no OpenImageIO
     from rendergraph.session import RenderOptions, stages  # nor this
 
-    for run in prepare(base, axes, out, None, metric=metric, only=only).runs:
+    for run in prepare(base, axes, out, None, options).runs:
         linked = run.planned.linked
-        options = RenderOptions(frames, linked.fps, outputs=(run.output,))
+        render_options = RenderOptions(frames, linked.fps, outputs=(run.output,))
         folder = run.folder / "frames"
         make_folder(folder)
         pattern = folder / f"{run.output}.####{run.picture.suffix}"
-        for frame in stages.draw(stages.expand(linked, options), gpu):
+        for frame in stages.draw(stages.expand(linked, render_options), gpu):
             path = numbered(pattern, frame.number)
             save_outputs([Saved(path, frame[run.output], frame.info(run.output), raw=False)], frame.metadata)
             yield path
