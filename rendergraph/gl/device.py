@@ -100,14 +100,14 @@ class Device(Struct, eq=False, dict=True):
 
     @cached_property
     def stores_blocks(self) -> bool:
-        """Whether a stage may use few uniform blocks, as on zink over the lavapipe of Mesa 22 and older.
+        """Whether a stage may use few uniform blocks, as on zink over the lavapipe of Mesa before 24.
 
         To compile branches on uniforms away, that driver notes their offsets in a table with 4 places a block, but
         counts 32 a block. It numbers push constants 0 and uniforms without a block 1; the notes on block 4 end up
         beyond the table, and the next draw crashes.
         """
         version = re.search(r"Mesa (\d+)", str(self.ctx.info["GL_VERSION"]))
-        return self.renderer.startswith("zink (llvmpipe") and version is not None and int(version[1]) <= 22
+        return self.renderer.startswith("zink (llvmpipe") and version is not None and int(version[1]) < 24
 
     def bind_block(self, buffer: moderngl.Buffer, point: int) -> None:
         buffer.bind_to_uniform_block(point)
