@@ -154,7 +154,7 @@ class Executable(Struct, eq=False, dict=True):
     vertex_arrays: Call = bool
     fresh: bool = True
     uses_previous: bool = False
-    made_kept: bool = False
+    has_new_kept: bool = False
     shares_kept: bool = True
     contents: dict[str, bytes] = field(default_factory=dict)
     stale: set[str] = field(default_factory=set)
@@ -194,7 +194,7 @@ class Executable(Struct, eq=False, dict=True):
         """A frame has run: go on without the kept steps that were due."""
         self._running, self.lists = False, self._steady
         if self.due:
-            self.due, self.made_kept = set(), True
+            self.due, self.has_new_kept = set(), True
 
     def mark_restored(self, resources: Collection[str]) -> None:
         """These kept values have been put where they belong: the steps that make nothing else have not to run."""

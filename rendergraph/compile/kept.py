@@ -37,37 +37,37 @@ class KeptValues(Struct, eq=False):
 
     device: Device
     limit: int
-    _held: dict[Content, _Held] = field(default_factory=dict)
+    _copies: dict[Content, _Held] = field(default_factory=dict)
 
     def save(self, executable: Executable) -> None:
         """Copy what it has made since it was asked last."""
-        if executable.due or not (executable.made_kept and executable.shares_kept):
+        if executable.due or not (executable.has_new_kept and executable.shares_kept):
             return
-        executable.made_kept = False
+        executable.has_new_kept = False
         for id, content in contents(executable).items():
-            held, made = self._held.pop(content, None), _of(executable, id)
+            held, made = self._copies.pop(content, None), _of(executable, id)
             if held is None:
                 held = self._like(made)
                 self._copy(made, held)
-            self._held[content] = held
-        while sum(_bytes(held) for held in self._held.values()) > self.limit:
-            self._delete(self._held.pop(next(iter(self._held))))
+            self._copies[content] = held
+        while sum(_bytes(held) for held in self._copies.values()) > self.limit:
+            self._delete(self._copies.pop(next(iter(self._copies))))
 
     def restore(self, executable: Executable) -> None:
         """Copy what is there of what it is about to make; the steps that make it have not to run."""
-        if not (executable.due and executable.shares_kept and self._held):
+        if not (executable.due and executable.shares_kept and self._copies):
             return
-        there = {id: content for id, content in contents(executable).items() if content in self._held}
+        there = {id: content for id, content in contents(executable).items() if content in self._copies}
         for id, content in there.items():
-            held = self._held[content] = self._held.pop(content)
+            held = self._copies[content] = self._copies.pop(content)
             self._copy(held, _of(executable, id))
         if there:
             executable.mark_restored(there)
 
     def release(self) -> None:
-        for held in self._held.values():
+        for held in self._copies.values():
             self._delete(held)
-        self._held.clear()
+        self._copies.clear()
 
     def _like(self, made: _Held) -> _Held:
         if isinstance(made, GpuTexture):

@@ -36,7 +36,7 @@ _MOST_KNOWN = 512
 """Moves from state to state that are remembered."""
 
 
-class _Touched(Struct, frozen=True):
+class _StepState(Struct, frozen=True):
     """What a step starts from and what it leaves, and where that lies."""
 
     needs: tuple[tuple[_Slot, Value], ...]
@@ -69,7 +69,7 @@ class Reuse(Struct, eq=False, dict=True):
             self._state, self._complete = None, True
             return None
         if self._state is None:  # all has run once; what that leaves is asked for now that there is a second frame
-            self._state = frozenset(self._missing(set(range(len(self._touched))), {})[1].items())
+            self._state = frozenset(self._missing(set(range(len(self._step_states))), {})[1].items())
         key = self._state, changed
         if key not in self._known:
             if len(self._known) >= _MOST_KNOWN:
@@ -98,7 +98,7 @@ class Reuse(Struct, eq=False, dict=True):
             position = self._makers[wanted.pop()]
             if position not in run:
                 run.add(position)
-                wanted += [value for slot, value in self._touched[position].needs if held.get(slot) != value]
+                wanted += [value for slot, value in self._step_states[position].needs if held.get(slot) != value]
         return run
 
     def _missing(
@@ -107,7 +107,7 @@ class Reuse(Struct, eq=False, dict=True):
         """What a step of these does not find where it should be, and else what the frame leaves."""
         now = dict(held)
         for position in sorted(run):
-            touched = self._touched[position]
+            touched = self._step_states[position]
             if missing := [(slot, value) for slot, value in touched.needs if now.get(slot) != value]:
                 return missing, now
             now.update(touched.leaves)
@@ -116,7 +116,7 @@ class Reuse(Struct, eq=False, dict=True):
     def _stale(self, changed: frozenset[Source]) -> set[int]:
         """The steps whose values are no longer what they would make."""
         stale: set[int] = set()
-        for position, touched in enumerate(self._touched):
+        for position, touched in enumerate(self._step_states):
             again = position in self._always or not changed.isdisjoint(self._sources[position])
             if again or any(self._makers[value] in stale for _, value in touched.needs):
                 stale.add(position)
@@ -136,7 +136,7 @@ class Reuse(Struct, eq=False, dict=True):
         return {(write.resource, write.version): at for at, step in steps for write in step.writes}
 
     @cached_property
-    def _touched(self) -> list[_Touched]:
+    def _step_states(self) -> list[_StepState]:
         return [self._of(step) for step in self.plan.schedule.steps]
 
     @cached_property
@@ -161,7 +161,7 @@ class Reuse(Struct, eq=False, dict=True):
             or any(write.resource in filled for write in step.writes)
         }
 
-    def _of(self, step: Step) -> _Touched:
+    def _of(self, step: Step) -> _StepState:
         needs: dict[tuple[_Slot, Value], None] = {}
         for read in step.all_reads:
             version = self._before(read.resource, read.version + 1)
@@ -175,7 +175,7 @@ class Reuse(Struct, eq=False, dict=True):
                 needs[self._at(write.resource, version)] = None
         leaves = [self._at(write.resource, write.version) for write in step.writes if self._moves(write.resource)]
         # Layers that a step writes at once are versions after each other: what it makes itself it does not wait for.
-        return _Touched(tuple(needs.keys() - set(leaves)), tuple(leaves))
+        return _StepState(tuple(needs.keys() - set(leaves)), tuple(leaves))
 
     def _moves(self, id: str) -> bool:
         """Whether a resource is made anew in a frame, unlike what is kept or the scene's."""

@@ -204,11 +204,11 @@ def test_copies_keep_to_a_budget_and_are_freed(bench: Any) -> None:
         for value in (1.0, 2.0, 3.0, 4.0):
             drawn(session, pipeline.set("a.value", value))
         values = session.cache.kept
-        assert len(values._held) == 4  # two of each; the last is in the executable alone
+        assert len(values._copies) == 4  # two of each; the last is in the executable alone
         assert ran(drawn(session, pipeline.set("a.value", 1.0))) == [*MADE, "b"]
         assert ran(drawn(session, pipeline.set("a.value", 4.0))) == ["b"]
         with session.current():
-            textures = [held.glo for held in values._held.values() if hasattr(held, "target")]
+            textures = [held.glo for held in values._copies.values() if hasattr(held, "target")]
             assert textures
             session.cache.release()
             assert not any(session.device.raw.glIsTexture(name) for name in textures)
