@@ -241,3 +241,27 @@ def test_a_function_that_fails_leaves_nothing_out_of_date(bench: Any, gl: rg.Ses
         CALLS.clear()
         drawing.draw(2)
         assert drawing.read()["image"][0, 0, 0] == 8
+
+
+class Table(Node):
+    """A kept table."""
+
+    color = Output(Radiance, format="rgba32f", doc="Its values.")
+    table = Internal(kind="buffer", bytes=16, kept=True)
+
+    def record(self, steps: Steps) -> None:
+        steps.upload(self.table, self.values)
+        steps.fullscreen("table.frag", out=self.color, table=self.table)
+
+    def values(self, scene: FrameScene) -> Any:
+        CALLS.append("table")
+        return np.arange(4, dtype=np.float32)
+
+
+def test_a_kept_table_is_taken_from_another_pipeline(bench: Any, gl: rg.Session) -> None:
+    CALLS.clear()
+    text = "nodes: {a: {type: table}}\noutputs: {image: a.color}"
+    pipeline = bench.pipeline(text, Table, shaders={"table.frag": TABLE_SHADER}, scene=SCENE)
+    for size in ((16, 8), (24, 8), (16, 8)):
+        np.testing.assert_array_equal(gl.render(pipeline, size=size)["image"][0, 0], [0, 1, 2, 3])
+    assert CALLS == ["table"]
