@@ -110,6 +110,12 @@ def texels(
     if desc.samples > 1 or [side for side in array.shape if side > 1] != [side for side in shape if side > 1]:
         text = f"'{name}' takes {' × '.join(map(str, shape))} numbers (layers, height, width, channels)"
         raise Misuse(f"{text}, got an array of shape {array.shape}", "RG432")
+    if texel.family == "depth_stencil":
+        raise Misuse(f"'{name}' is {desc.format}, which takes no upload; use depth32f for depth without stencil")
+    if texel.is_bytes and array.dtype.kind != "f" and not np.array_equal(array, np.clip(array, 0, 255)):
+        raise Misuse(
+            f"'{name}' takes bytes, or floats from 0 to 1, got {array.dtype} from {array.min()} to {array.max()}"
+        )
     if texel.is_bytes and array.dtype.kind == "f":
         array = np.rint(255 * np.clip(array, 0.0, 1.0)).astype(np.uint8)
     return array.reshape(shape)
