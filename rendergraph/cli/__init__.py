@@ -29,6 +29,7 @@ def main(args: Sequence[str] | None = None) -> int:
         return run(sys.argv[1:] if args is None else args)
     finally:
         activity.note("")()  # what ends the process from now on is no crash
+        os.environ.pop(activity.DRAW_TIMEOUT, None)  # nor are other draws of a Python program limited
 
 
 def commands() -> dict[str, click.Command]:

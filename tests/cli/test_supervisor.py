@@ -11,6 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from rendergraph import activity
+from rendergraph.cli import main
+
 # One pixel takes about a quarter of a second, and llvmpipe draws all of them inside of one call.
 SLOW = """/*---
 doc: Burn time.
@@ -179,3 +182,8 @@ def test_signals_that_are_ignored_stay_ignored(tmp_path: Path) -> None:
         preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN),  # as nohup does
     )
     assert "alive" in done.stderr, done
+
+
+def test_a_limit_of_draws_ends_with_its_command_line() -> None:
+    assert main(["run", "nowhere", "--draw-timeout", "9"]) == 3
+    assert activity.draw_seconds() == 0
