@@ -107,11 +107,12 @@ def texels(
         return array
     texel, layers = FORMATS[desc.format], 1 if layer is not None else desc.mip_layers(mip or 0)
     shape = (layers, *desc.mip_size(mip or 0)[::-1], texel.components)
-    if desc.samples > 1 or [side for side in array.shape if side > 1] != [side for side in shape if side > 1]:
+    if desc.samples > 1 or texel.family == "depth_stencil":
+        what = f"has {desc.samples} samples per texel" if desc.samples > 1 else f"is {desc.format}"
+        raise Misuse(f"'{name}' {what}, which takes no upload; upload a texture without samples and stencil")
+    if [side for side in array.shape if side > 1] != [side for side in shape if side > 1]:
         text = f"'{name}' takes {' × '.join(map(str, shape))} numbers (layers, height, width, channels)"
         raise Misuse(f"{text}, got an array of shape {array.shape}", "RG432")
-    if texel.family == "depth_stencil":
-        raise Misuse(f"'{name}' is {desc.format}, which takes no upload; use depth32f for depth without stencil")
     if texel.is_bytes and array.dtype.kind != "f" and not np.array_equal(array, np.clip(array, 0, 255)):
         raise Misuse(
             f"'{name}' takes bytes, or floats from 0 to 1, got {array.dtype} from {array.min()} to {array.max()}"

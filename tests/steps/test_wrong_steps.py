@@ -16,6 +16,7 @@ numbers = Internal(kind="buffer", bytes=64)
 last = History(kind="buffer", bytes=64)
 bytes = Internal(format="r8", size=(2, 1))
 stencil = Internal(Depth, format="depth32f_stencil8", size=(2, 1))
+several = Internal(format="r8", size=(2, 1), samples=4)
 given = Input(AnyTexel, kind="buffer", optional=True, doc="Numbers of another.")
 views = Views(count=2, doc="Two views.")
 gain: float = param(default=1.0, doc="Gain.")
@@ -76,7 +77,7 @@ CALLS = {
     'steps.geometry("wrong.frag", materials="all")': "RG423 materials is 'all'; available: alpha, full, none",
     'steps.geometry("wrong.frag", order="back to front")': "RG423 order is 'back to front'; did you mean 'back_to_front'?",
     'steps.geometry("wrong.frag", per_light=-1)': "RG423 per_light is -1, not a whole number from 0 up or None",
-    'steps.geometry("wrong.frag", view="camera")': "RG423 view is the text 'camera'; give the port itself; available: bytes, chain, color, given, last, nearest, numbers, small, source, stencil, views",
+    'steps.geometry("wrong.frag", view="camera")': "RG423 view is the text 'camera'; give the port itself; available: bytes, chain, color, given, last, nearest, numbers, several, small, source, stencil, views",
     'steps.geometry("wrong.frag", view=self.color)': "RG423 view is the Output 'color'; it is a Views port or an input that carries views",
     'steps.geometry("wrong.frag", view=self.views, view_index=2)': "RG423 view_index is 2, but 'views' has 2 views, counted from 0",
     'steps.geometry("wrong.frag", view_index="0")': "RG423 view_index is '0', not a whole number from 0 up or None",
@@ -84,7 +85,8 @@ CALLS = {
     'steps.fullscreen("wrong.frag", source=self.source.sampled("bilinear"))': "RG423 sampled: filter is 'bilinear'; did you mean 'linear'?",
     'steps.fullscreen("wrong.frag", source=self.source.sampled(wrap="edge"))': "RG423 sampled: wrap is 'edge'; available: border, clamp, mirror, repeat",
     "steps.upload(self.bytes, [[300, -1]])": "RG423 'bytes' takes bytes, or floats from 0 to 1, got int64 from -1 to 300",
-    "steps.upload(self.stencil, [[0.5, 0.5]])": "RG423 'stencil' is depth32f_stencil8, which takes no upload; use depth32f for depth without stencil",
+    "steps.upload(self.stencil, [[0.5, 0.5]])": "RG423 'stencil' is depth32f_stencil8, which takes no upload; upload a texture without samples and stencil",
+    "steps.upload(self.several, [[0.5, 0.5]])": "RG423 'several' has 4 samples per texel, which takes no upload; upload a texture without samples and stencil",
     'steps.draw("wrong.frag", vertex="wrong.vert", vertices=self.last.previous)': "RG423 vertices is a part of 'last'; give the port itself, only shaders read last frame's values",
     'steps.draw("wrong.frag", vertex="wrong.vert", vertices=3, indices=self.last.previous)': "RG423 indices is a part of 'last'; give the port itself, only shaders read last frame's values",
     'steps.draw("wrong.frag", vertex="wrong.vert", vertices=3, indices=5)': "RG423 indices is 5, not a port",
