@@ -83,9 +83,10 @@ class Checker(Struct, eq=False):
         if port.use == "image" and (texel.is_depth or texel.srgb):
             return "is loaded as an image, so no depth and no sRGB"
         whole = texel.family in ("uint", "int") and not port.compare
-        return (
-            "is filtered, so no whole numbers" if whole and self.infer.sampler(draft, port).filter != "nearest" else ""
-        )
+        if whole and port.wrap == "border":  # its value is a float
+            return "has a border, so no whole numbers"
+        filtered = whole and self.infer.sampler(draft, port).filter != "nearest"
+        return "is filtered, so no whole numbers" if filtered else ""
 
     def _report(self, draft: UnlinkedNode, port: Port, link: Link, mismatch: _Mismatch) -> None:
         code, expected, given, converts = mismatch

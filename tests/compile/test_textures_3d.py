@@ -137,3 +137,8 @@ def test_a_border_has_the_declared_value(draw: Draw) -> None:
     np.testing.assert_array_equal(draw(text, Other, Edge, shaders=shaders)["image"][0, 0], [0.25, 0.5, 0.75, 0.0])
     ids = draw("nodes: {i: {type: ids}}\noutputs: {ids: i.ids}", Ids, shaders=shaders)["ids"]
     np.testing.assert_array_equal(ids[0, 3], [1, 2, 65535, 3])
+    text = "nodes: {i: {type: ids}, e: {type: edge, inputs: {source: i.ids}}}\noutputs: {image: e.color}"
+    with pytest.raises(
+        InputError, match=r"RG215 'e.source' has a border, so no whole numbers, but 'i.ids' .* rgba16ui"
+    ):
+        draw(text, Ids, Edge, shaders=shaders)
