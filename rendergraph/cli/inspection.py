@@ -102,9 +102,10 @@ def plan(
 
     render_options = RenderOptions(alias=not no_alias, heap=heap, shuffle=shuffle)
     plan = stages.plan(stages.expand(options.link(selection), render_options)).plan
-    emit_json(diagrams.plan_json(plan)) if as_json else emit(
-        diagrams.plan_text(plan, every_step=every_step).rstrip("\n")
-    )
+    if as_json:
+        emit_json(diagrams.plan_json(plan))
+    else:
+        emit(diagrams.plan_text(plan, every_step=every_step).rstrip("\n"))
 
 
 @click.command("graph", no_args_is_help=True)

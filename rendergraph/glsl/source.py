@@ -277,7 +277,7 @@ def find_old_names(source: SourceText, include_folder: Path) -> tuple[dict[str, 
     for file, (old, new) in product(own, _old_names(include_folder).items()):
         name, text = old.strip("<>.()"), strip_comments(read_text(file))
         pattern = re.escape(old).replace(r"\(\)", r"(?=\s*\()") + r"(?!\w)"
-        match = re.search(r"(?<![\w.])" * (old[0] != ".") + pattern, text)
+        match = re.search(pattern if old[0] == "." else r"(?<![\w.])" + pattern, text)
         is_own = match and name in declared(text) and new in declared(shared)  # the file means its own function
         if match and not is_own and (old[0] == "<" or name.startswith("v_") or mentions(shared, new)):
             macros |= {name: new} if old[0] != "<" else {}
