@@ -278,7 +278,8 @@ def find_old_names(source: SourceText, include_folder: Path) -> tuple[dict[str, 
         name, text = old.strip("<>.()"), strip_comments(read_text(file))
         pattern = re.escape(old).replace(r"\(\)", r"(?=\s*\()") + r"(?!\w)"
         match = re.search(pattern if old[0] == "." else r"(?<![\w.])" + pattern, text)
-        is_own = match and name in declared(text) and new in declared(shared)  # the file means its own function
+        defined = rf"(?m)^\s*\w+\s+{new}\s*\([^;{{}}]*\)\s*\{{|\b(?:define|struct)\s+{new}\b"
+        is_own = match and name in declared(text) and re.search(defined, shared)  # not what an include lets it define
         if match and not is_own and (old[0] == "<" or name.startswith("v_") or mentions(shared, new)):
             macros |= {name: new} if old[0] != "<" else {}
             before = text[: match.start()].split("\n")

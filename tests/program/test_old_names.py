@@ -137,6 +137,14 @@ def test_a_function_of_ones_own_may_have_an_old_name(author: Any, gl: rg.Session
     assert np.allclose(gl.render(author.pipeline())["image"], [3, 3, 3, 1])
 
 
+def test_what_an_include_lets_a_file_define_may_have_its_old_name(author: Any, gl: rg.Session) -> None:
+    author.node('color = Output(Radiance, doc="Colour.")')
+    tap = "vec4 halving_tap(ivec2 texel) { return vec4(3.0); }\n"
+    text = "out vec4 color;\nvoid main() { color = halved(ivec2(0), ivec2(3)); }\n"
+    author.write(wrong__frag=f"#include <halving.glsl>\n{tap}{text}")
+    assert np.allclose(gl.render(author.pipeline())["image"], 3)
+
+
 def test_an_old_include_is_found(author: Any) -> None:
     text = "#include <{}>\nout vec4 color;\nvoid main() {{ color = linear_to_srgb(vec3(0.5)).rgbb; }}\n"
     author.node('color = Output(Radiance, doc="Colour.")')
