@@ -217,9 +217,9 @@ class Runner(Struct, eq=False):
             with _author_errors(node, "update"):
                 node.node.update(frame)  # pyright: ignore[reportArgumentType]  # a cached_property is one to mypy
             updates[node.id] = perf_counter() - before
-        taken = executable.kept.keys() - executable.due  # kept values that other pipelines may have left
+        restored = executable.kept.keys() - executable.due  # kept values that other pipelines may have left
         uploads = executable.uploads.items()
-        stale = {key: up for key, up in uploads if up.is_stale and (key not in taken or up.upload.sources)}
+        stale = {key: up for key, up in uploads if up.is_stale and (key not in restored or up.upload.sources)}
         if stale:
             executable.computed(stale)  # noted before one of them may fail
         for key, values in stale.items():
