@@ -226,8 +226,8 @@ class Dask(Executor):
 
     def _events_of(self, task: Task, future: Future) -> Iterator[Event]:
         begun = time.monotonic()
-        answer = None
-        if future.status == "finished":
+        answer, finished = None, future.status == "finished"
+        if finished:
             with contextlib.suppress(CancelledError):  # the worker that held it is gone
                 answer = future.result()
         if answer is None and future.status != "error":
@@ -235,7 +235,8 @@ class Dask(Executor):
                 time.sleep(_POLL)
                 self._check_scheduler(begun)
             self._check_scheduler(None)
-            if self._upload_of[task] == self._uploads:  # most likely its inputs are lost, too
+            inputs_left = finished and all(upload.status == "finished" for upload in self._uploaded.values())
+            if not inputs_left and self._upload_of[task] == self._uploads:  # most likely they are lost, too
                 self._upload_again()
             error = RenderError(Problem("RG640", "the cluster lost the task"))
             yield self.retry(task, "scheduler", error, inputs_lost=True)

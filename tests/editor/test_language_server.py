@@ -257,6 +257,7 @@ def test_what_is_right_is_not_underlined(editor: Editor, desk: Path) -> None:
     assert editor.marks(desk, PIPELINE.partition("\n")[0] + "\n" + patch) == []
 
 
+@pytest.mark.nightly(keep=10)
 @pytest.mark.parametrize("file", shipped_pipelines().values(), ids=lambda file: file.stem)
 def test_nothing_shipped_is_underlined(editor: Editor, desk: Path, file: Path) -> None:
     assert editor.marks(desk, PIPELINE.partition("\n")[0] + "\n" + file.read_text(encoding="utf-8")) == []
