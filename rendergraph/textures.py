@@ -267,9 +267,11 @@ class Layout(Struct, frozen=True, eq=False):
     fields: Mapping[str, str]
 
     def __post_init__(self) -> None:
-        wrong = [f"{kind} {name}" for name, kind in self.fields.items() if kind not in _STD430]
-        if wrong or not self.fields:
-            raise TypeError(f"Layout '{self.name}' cannot hold {wrong or 'nothing'}; available: {', '.join(_STD430)}")
+        names = [self.name, *self.fields] if isinstance(self.fields, Mapping) else []
+        if len(names) < 2 or not all(isinstance(name, str) and name.isidentifier() for name in names):
+            raise TypeError(f"Layout({self.name!r}, {self.fields!r}) is not like Layout('Spark', {{'age': 'float'}})")
+        if wrong := [f"{kind} {name}" for name, kind in self.fields.items() if kind not in _STD430]:
+            raise TypeError(f"Layout '{self.name}' cannot hold {wrong}; available: {', '.join(_STD430)}")
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Layout) and self.glsl == other.glsl  # the order of fields counts

@@ -89,6 +89,9 @@ def test_fields_lie_where_std430_has_them() -> None:
     assert Layout("Two", {"a": "float", "b": "vec3"}) != Layout("Two", {"b": "vec3", "a": "float"})
     with pytest.raises(TypeError, match=r"Layout 'Bad' cannot hold \['double a'\]; available: float, vec2"):
         Layout("Bad", {"a": "double"})
+    for name, fields in (("Bad", {}), ("a b", {"a": "int"}), (5, {"a": "int"}), ("Bad", ["a"]), ("Bad", {"2a": "int"})):
+        with pytest.raises(TypeError, match=r"Layout\(.*\) is not like Layout\('Spark', \{'age': 'float'\}\)"):
+            Layout(name, fields)  # type: ignore[arg-type]
 
 
 def test_numpy_and_shaders_see_the_same_fields(draw: Draw) -> None:
