@@ -133,20 +133,18 @@ Surface fragment_surface(View view) {
     if (!gl_FrontFacing) s.normal = -s.normal;
 #endif
 
+    s.lit = 1.0;
 #ifdef UNLIT
     s.lit = 0.0;
-#else
-    s.lit = 1.0;
 #endif
     s.occlusion = 1.0;
 #ifdef HAS_OCCLUSION_TEXTURE
     float occlusion = texture(occlusion_texture, slot_uv(v_material, OCCLUSION_SLOT, UV_SET(OCCLUSION_UV))).r;
     s.occlusion += m.surface.z * (occlusion - 1.0);
 #endif
+    s.emissive = m.emissive.rgb;
 #ifdef NO_EMISSIVE  // no material of the scene is emissive
     s.emissive = vec3(0.0);
-#else
-    s.emissive = m.emissive.rgb;
 #endif
 #ifdef HAS_EMISSIVE_TEXTURE
     s.emissive *= texture(emissive_texture, slot_uv(v_material, EMISSIVE_SLOT, UV_SET(EMISSIVE_UV))).rgb;
