@@ -133,14 +133,14 @@ class Input(Port, frozen=True, eq=False):
     wrap: Wrap = "clamp"
     compare: bool = False
     anisotropy: Positive = 1
-    border: Texel | None = None
     samples: Literal["single", "multi", "any"] = "single"
     optional: bool = False
     many: bool = False
     use: Literal["sample", "depth_test", "image"] = "sample"
     group: str | None = None
-    element: Elements | None = None
     doc: str = ""
+    border: Texel | None = None
+    element: Elements | None = None
 
     def link(self, number: int) -> Part:
         """One texture of an input that takes a list, counted from 0; its name in the shader has no number."""
@@ -192,13 +192,13 @@ class WrittenPort(Port, frozen=True, eq=False):
     layers: Ruled[Count] | None = None
     samples: Samples | Rule[int] | None = None
     bytes: Ruled[Count] = 0
-    element: Elements | None = None
-    count: Ruled[Count] = 0
     clear: Ruled[Texel | None] = None
     first: float | None = None
     view: str | None = None
     lights: str | Rule[tuple[int, ...]] | None = None
     doc: str = ""
+    element: Elements | None = None
+    count: Ruled[Count] = 0
 
 
 class Output(WrittenPort, frozen=True, eq=False):
