@@ -110,7 +110,7 @@ def new_node(name: str, kind: Kind = "fullscreen", *, package: bool = False, whe
     inside = [path.removeprefix(f"{name}/") if package else path for path in files]
     source = next(p for p in inside if Path(p).name == (f"{name}.frag" if kind == "shader-only" else f"{name}.py"))
     run = pipeline.removeprefix(f"{name}/") if package else pipeline
-    commands = [f"rendergraph run {run} {plugin}".rstrip(), f"rendergraph check-node {source}", "pytest"]
+    commands = [f"rendergraph run {run} {plugin}".rstrip(), f"rendergraph check-node {source}", "python -m pytest"]
     if has_schema:
         commands.append(f"rendergraph schema {'' if is_found else '--plugin . '}-o {SCHEMA_FILE}")
     if package:

@@ -147,6 +147,10 @@ def command(
         return
     if out is None:
         raise UsageError(Problem("RG500", "a sweep needs a folder for its runs: -o DIR; --list needs none"))
+    if out.suffix in {".csv", ".html", ".json", ".jsonl"} and not out.is_dir():
+        folder = out.with_suffix("")
+        text = f"-o is a folder, in which --csv writes results.csv beside report.html; '{out}' is a file's name: -o {folder}"
+        raise UsageError(Problem("RG500", text))
     try:
         with at_its_lines(file):
             outcome = (search if how.minimise else sweep)(base, space, out, against, how)
@@ -262,7 +266,7 @@ def _text(outcome: Sweep) -> str:
     heads, rows = (*heads, "Pareto"), [(*row, "front" if row[0] in front else "") for row in rows]
     lines = [
         f"{amount(len(rows), 'run')} against {comparison.reference.name}: "
-        f"{amount(outcome.executed, 'pass', 'passes')} executed, {outcome.alone} one by one"
+        f"{amount(outcome.executed, 'pass', 'passes')} executed, {outcome.alone} without sharing"
         + (f"; {amount(outcome.resumed, 'run')} reused" if outcome.resumed else "")
         + (f"; {amount(len(outcome.failures), 'run')} failed" if outcome.failures else ""),
         table(rows, heads, right=range(1, len(heads) - 1)),
@@ -283,12 +287,12 @@ def _show(outcome: Listing) -> None:
     document, runs = outcome.as_json(), outcome.prepared.runs
     emit(
         f"{amount(len(runs), 'run')} against {document['reference']}: "
-        f"{amount(outcome.executed, 'pass', 'passes')} to execute, {document['passes_one_by_one']} one by one"
+        f"{amount(outcome.executed, 'pass', 'passes')} to execute, {document['passes_one_by_one']} without sharing"
         + (f"; {amount(len(outcome.kept), 'run')} kept" if outcome.kept else "")
     )
     if outcome.groups:
         rows = [(name, str(drawn), str(alone)) for name, (drawn, alone) in outcome.shared().items()]
-        emit(table(rows, ("pass", "executed", "one by one"), right=(1, 2)))
+        emit(table(rows, ("pass", "executed", "without sharing"), right=(1, 2)))
     paths, group_of = [axis.path for axis in outcome.prepared.space.axes], outcome.group_of()
     values = [[run.settings[path] for path in paths] for run in runs]
     emit(table([(group_of.get(number, "kept"), *row) for number, row in enumerate(values)], ("group", *paths)))

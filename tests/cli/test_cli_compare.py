@@ -144,6 +144,7 @@ def test_nan_is_magenta_in_a_png_and_its_first_texture_is_named(cli: Any, tmp_pa
         ),
         (("sweep", "forward", "-o", "out"), 3, "RG524 the sweep has no axis"),
         (("sweep", "forward", "-x", "shadows.taps=1"), 2, "RG500 a sweep needs a folder for its runs: -o DIR"),
+        (("sweep", "forward", "-x", "shadows.taps=1", "-o", "all.csv"), 2, "'all.csv' is a file's name: -o all"),
         (("sweep", "forward", "-x", "shadows.taps=1:4:0", "-o", "out"), 2, "steps of 0 do not lead from 1 to 4"),
         (("sweep", "forward", "-x", "shadows.taps=1:4", "--list"), 3, "add a step (1:4:STEP) or use --samples"),
         (("sweep", "forward", "-x", "a.b=1,2", "--zip", "a.b", "--list"), 2, "is not PATH,PATH"),
@@ -176,7 +177,7 @@ def test_sweep_draws_keeps_and_resumes(cli: Any, tmp_path: Path) -> None:
     )
     first = cli(*words)
     assert first.code == 0
-    assert "4 runs against shadows.taps=1,display.curve=aces: 7 passes executed, 12 one by one" in first.out
+    assert "4 runs against shadows.taps=1,display.curve=aces: 7 passes executed, 12 without sharing" in first.out
     assert first.out.splitlines()[-1] == "out/report.html"
     assert "Pareto front" in (tmp_path / "out" / "report.html").read_text()
     assert cli(*words).code == 3
@@ -200,7 +201,7 @@ def test_a_sweep_file(cli: Any, tmp_path: Path) -> None:
 def test_a_sweep_is_listed_before_it_is_drawn(cli: Any, tmp_path: Path) -> None:
     words = ("-x", "shadows.taps=1:3:1", "-x", "display.curve=aces,none", "--size", "48x27", "--list")
     told = cli("sweep", "forward", "--scene", "cornell_box", *words).out.splitlines()
-    assert told[0] == "6 runs against shadows.taps=1,display.curve=aces: 10 passes to execute, 18 one by one"
+    assert told[0] == "6 runs against shadows.taps=1,display.curve=aces: 10 passes to execute, 18 without sharing"
     assert [line.split() for line in told[2:6]] == [
         ["sun", "1", "6"],
         ["light", "3", "6"],
