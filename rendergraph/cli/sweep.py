@@ -148,8 +148,7 @@ def command(
     if out is None:
         raise UsageError(Problem("RG500", "a sweep needs a folder for its runs: -o DIR; --list needs none"))
     if out.suffix in {".csv", ".html", ".json", ".jsonl"} and not out.is_dir():
-        folder = out.with_suffix("")
-        text = f"-o is a folder, in which --csv writes results.csv beside report.html; '{out}' is a file's name: -o {folder}"
+        text = f"-o takes a folder for report.html and, with --csv, results.csv, not a file: -o {out.with_suffix('')}"
         raise UsageError(Problem("RG500", text))
     try:
         with at_its_lines(file):

@@ -144,7 +144,11 @@ def test_nan_is_magenta_in_a_png_and_its_first_texture_is_named(cli: Any, tmp_pa
         ),
         (("sweep", "forward", "-o", "out"), 3, "RG524 the sweep has no axis"),
         (("sweep", "forward", "-x", "shadows.taps=1"), 2, "RG500 a sweep needs a folder for its runs: -o DIR"),
-        (("sweep", "forward", "-x", "shadows.taps=1", "-o", "all.csv"), 2, "'all.csv' is a file's name: -o all"),
+        (
+            ("sweep", "forward", "-x", "shadows.taps=1", "-o", "all.csv"),
+            2,
+            "with --csv, results.csv, not a file: -o all",
+        ),
         (("sweep", "forward", "-x", "shadows.taps=1:4:0", "-o", "out"), 2, "steps of 0 do not lead from 1 to 4"),
         (("sweep", "forward", "-x", "shadows.taps=1:4", "--list"), 3, "add a step (1:4:STEP) or use --samples"),
         (("sweep", "forward", "-x", "a.b=1,2", "--zip", "a.b", "--list"), 2, "is not PATH,PATH"),
