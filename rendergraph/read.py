@@ -41,8 +41,8 @@ PARAMETER = Table(
     "'{}'",
     (
         Key("default", Any, "Its value where nothing sets it."),
-        Key("min", NUMBER, "Least legal value."),
-        Key("max", NUMBER, "Greatest legal value."),
+        Key("min", NUMBER, "Minimum."),
+        Key("max", NUMBER, "Maximum."),
         Key("doc", TEXT, "What it does, in a line."),
     ),
 )
@@ -61,7 +61,7 @@ NODE = Table(
         Key("type", Recursive(TEXT, lambda: PIPELINE), "A node type, or a pipeline file."),
         Key("inputs", MapOf(_LINK, _NAMING), "Input to `node.port`, to a node's id, or to null for nothing."),
         Key("params", MapOf(Any, _NAMING), "Parameter to value; null is its default."),
-        Key("enabled", bool, "`false` takes the node out: its readers read what went into it.", default=True),
+        Key("enabled", bool, "`false` takes the node out; its readers then read its own input.", default=True),
     ),
 )
 _NOT_A_NODE = {"inputs": "a node cannot be called 'inputs'; rename it"}
@@ -82,11 +82,11 @@ PIPELINE: Table = Table(
         Key(
             "warm_up",
             whole(1, 10_000),
-            "How many frames decide the next, where it depends on those before; drawn in parts, each begins so early.",
+            "Number of earlier frames that a frame depends on; each part of a split film starts so many frames early.",
         ),
-        Key("parameters", MapOf(PARAMETER, _NAMING), "Knobs of the whole pipeline, used as $name."),
-        Key("inputs", MapOf(INPUT, _NAMING), "What the file takes as the type of a node."),
-        Key("nodes", MapOf(NODE, _NAMING, "node id", _NOT_A_NODE), "Nodes by id."),
+        Key("parameters", MapOf(PARAMETER, _NAMING), "Parameters of the pipeline, which its nodes use as $name."),
+        Key("inputs", MapOf(INPUT, _NAMING), "Inputs of the pipeline when it is the type of a node."),
+        Key("nodes", MapOf(NODE, _NAMING, "node id", _NOT_A_NODE), "Nodes, by id."),
         Key("outputs", MapOf(TEXT, _NAMING, "output name"), "Output name to `node.port`."),
     ),
     code="RG101",
