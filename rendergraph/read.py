@@ -61,7 +61,7 @@ NODE = Table(
         Key("type", Recursive(TEXT, lambda: PIPELINE), "A node type, or a pipeline file."),
         Key("inputs", MapOf(_LINK, _NAMING), "Input to `node.port`, to a node's id, or to null for nothing."),
         Key("params", MapOf(Any, _NAMING), "Parameter to value; null is its default."),
-        Key("enabled", bool, "`false` takes the node out; its readers then read its own input.", default=True),
+        Key("enabled", bool, "`false` takes the node out; nodes that read it read its input instead.", default=True),
     ),
 )
 _NOT_A_NODE = {"inputs": "a node cannot be called 'inputs'; rename it"}

@@ -112,7 +112,7 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         if name not in self.arrays:
-            raise KeyError(f"no output '{name}'{suggestion(name, self.arrays)}")
+            raise KeyError(f"no output '{name}'{suggestion(name, self.arrays)}; render(taps=['NODE.PORT']) adds ports")
         return self.arrays[name]
 
     def __iter__(self) -> Iterator[str]:

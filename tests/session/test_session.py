@@ -109,7 +109,12 @@ def test_what_a_notebook_gives_is_understood_or_refused_in_words(gl: rg.Session)
     values = np.linspace(0, 1, 3, dtype=np.float32)
     assert pipeline.set("display.exposure", values[1]).selection.sets == ("display.exposure=0.5",)
     assert pipeline.set("light.ambient", values).selection.sets == ("light.ambient=[0.0, 0.5, 1.0]",)
-    assert list(gl.render(pipeline, outputs="image", taps="gbuffer.depth")) == ["image", "gbuffer.depth"]
+    frame = gl.render(pipeline, outputs="image", taps="gbuffer.depth")
+    assert list(frame) == ["image", "gbuffer.depth"]
+    with pytest.raises(
+        KeyError, match=r"no output 'depth'; .*gbuffer.depth.*; render\(taps=\['NODE.PORT'\]\) adds ports"
+    ):
+        frame["depth"]
     for source in ("deferred", shipped_pipelines()["deferred"]):
         np.testing.assert_array_equal(gl.render(source, (8, 8))["image"], gl.render(pipeline)["image"])
     assert gl.render(pipeline, size=(4, 4)).size == (4, 4)
