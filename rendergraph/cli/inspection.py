@@ -70,7 +70,9 @@ def check(selection: Selection, as_json: bool, profile: str | None) -> None:
     warn(later)
     width, height = graph.size
     links = sum(len(ends) for node in graph.nodes for ends in node.inputs.values())
-    say(f"{graph.name}: {len(graph.nodes)} nodes, {links} links, {width}×{height}, outputs {', '.join(graph.outputs)}")
+    fits = "; within the limits of every OpenGL 4.5 device" if profile else ""
+    names = ", ".join(graph.outputs)
+    say(f"{graph.name}: {len(graph.nodes)} nodes, {links} links, {width}×{height}, outputs {names}{fits}")
     if as_json:
         report = {"pipeline": graph.name, "size": [width, height], "nodes": len(graph.nodes), "links": links}
         outputs = {name: str(end) for name, end in graph.outputs.items()}
