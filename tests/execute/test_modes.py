@@ -173,7 +173,7 @@ def small(name: str) -> rg.Pipeline:
 
 
 @pytest.mark.slow
-@pytest.mark.nightly(keep=29)
+@pytest.mark.nightly(keep=20)
 @pytest.mark.parametrize("name", sorted(shipped_pipelines()))
 def test_shipped_pipelines_draw_the_same_in_another_order_with_poisoned_memory(gl: rg.Session, name: str) -> None:
     plain = gl.render(small(name), alias=False, warm_up=False)

@@ -125,7 +125,7 @@ def test_what_faces_the_light_has_no_acne(session: rg.Session, tmp_path: Path, k
 # --- both forms ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.nightly(keep=4)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize("scene", ["cornell_box", "shadow_study"])
 @pytest.mark.parametrize("kind", list(WIDE))
 def test_both_forms_give_the_same_picture(session: rg.Session, kind: str, scene: str) -> None:
@@ -162,7 +162,7 @@ cameras:
     return file
 
 
-@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("kind", list(WIDE))
 def test_several_lights_are_the_sum_of_each(session: rg.Session, tmp_path: Path, kind: str) -> None:
     """A directional, two spot and a point light (six layers) at once, in both forms."""
