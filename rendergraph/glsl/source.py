@@ -77,7 +77,8 @@ class SourceText(Struct, frozen=True, dict=True):
 
     @property
     def files(self) -> set[Path]:
-        return {block.origin.file for block in self.blocks if block.origin.file is not None}
+        by_id = {id(block.origin.file): block.origin.file for block in self.blocks}  # comparing paths is slow
+        return {file for file in by_id.values() if file is not None}
 
     @cached_property
     def origins(self) -> tuple[Origin, ...]:
@@ -272,7 +273,8 @@ def find_old_names(source: SourceText, include_folder: Path) -> tuple[dict[str, 
     """Return macros for the old names that plugins' files use, and a warning (RG449) for each."""
     macros: dict[str, str] = {}
     warnings: list[Problem] = []
-    own = [file for file in source.files if include_folder.parent not in file.parents]
+    shipped = str(include_folder.parent)
+    own = [file for file in source.files if not str(file).startswith(shipped)]
     shared = SourceText(tuple(block for block in source.blocks if own and block.origin.file not in own)).text
     for file, (old, new) in product(own, _old_names(include_folder).items()):
         name, text = old.strip("<>.()"), strip_comments(read_text(file))

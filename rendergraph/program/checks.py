@@ -167,7 +167,7 @@ def _always(text: str) -> str:
     """Return a text without what is inside `#if`."""
     depth, kept = 0, []
     for line in text.split("\n"):
-        directive = re.match(r"\s*#\s*(ifdef|ifndef|if|endif)\b", line)
+        directive = re.match(r"\s*#\s*(ifdef|ifndef|if|endif)\b", line) if "#" in line else None
         depth += 0 if directive is None else -1 if directive[1] == "endif" else 1
         kept.append(line if depth == 0 and directive is None else "")
     return "\n".join(kept)

@@ -6,10 +6,8 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, wraps
-from typing import Annotated, Any, ParamSpec, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeAlias
 
-import numpy as np
-import numpy.typing as npt
 from msgspec.structs import replace
 
 from rendergraph.errors import Misuse, nearest, suggestion
@@ -17,6 +15,9 @@ from rendergraph.ports import Part, Port, WrittenPort
 from rendergraph.steps.model import UniformValue
 from rendergraph.textures import FORMATS, BufferDesc, Normal, TextureDesc
 from rendergraph.typecheck import Length, Range, accepts, hints_of, mistakes_in, quoted, test_of
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
 _ATTRIBUTE = r"[1-4]?[fiu][1248]?(?:/[vi])?\Z"
 _PADDING = r"\d+x[1248]?(?:/[vi])?\Z"
@@ -96,6 +97,8 @@ def texels(
     Raises:
         Misuse: they are not numbers, or do not fill the texture or fit the buffer.
     """
+    import numpy as np  # declaring nodes does not need it
+
     array = np.asarray(values)
     if array.dtype.kind not in "biuf" and array.dtype != getattr(getattr(desc, "element", None), "dtype", None):
         raise Misuse(f"'{name}' is given {type(values).__name__} of {array.dtype}, not an array of numbers")
