@@ -156,6 +156,12 @@ class TextureInfo(Struct, frozen=True, gc=False):
         return self.desc if self.desc is not None else BufferDesc(self.bytes, self.element)
 
     @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of a texture."""
+        assert self.desc is not None, "only textures have a size"
+        return self.desc.size
+
+    @property
     def holds_values(self) -> bool:
         """Whether it is a texture or a buffer, which can be read back; a function or a view is neither."""
         return self.desc is not None or self.bytes > 0

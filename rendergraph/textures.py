@@ -114,6 +114,9 @@ class Semantic(Struct, frozen=True):
 Radiance = Semantic("radiance", "Scene-linear radiance, Rec. 709 primaries, 0 to infinity.", encoding="linear")
 DisplayColor = Semantic("display_color", "Display-referred colour, sRGB encoded, 0 to 1.", encoding="display")
 Albedo = Semantic("albedo", "Linear base colour, 0 to 1.", encoding="linear")
+AlbedoRoot = Semantic(
+    "albedo_root", "Square root of the linear base colour, 0 to 1, whose steps are about perceptually uniform."
+)
 Emissive = Semantic("emissive", "Emitted radiance, scene-linear.", encoding="linear")
 Normal = Semantic("normal", "Unit normal in world space.", space="world")
 Material = Semantic("material", "Metallic, roughness, occlusion and model data, 0 to 1.")

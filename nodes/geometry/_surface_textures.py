@@ -10,14 +10,10 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rendergraph.api import AlbedoRoot, Emissive, Facts, Input, Material, Normal, ObjectFacts, Output, Semantic
 from rendergraph.api import Any as AnyTexel
-from rendergraph.api import Emissive, Facts, Input, Material, Normal, ObjectFacts, Output, Semantic
 
 from ._samples import own_samples
-
-AlbedoRoot = Semantic(
-    "albedo_root", "Square root of the linear base colour, 0 to 1, whose steps are about perceptually uniform."
-)
 
 
 @dataclass(frozen=True)

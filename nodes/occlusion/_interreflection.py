@@ -6,6 +6,7 @@ from typing import Any
 
 from rendergraph.api import (
     ADD,
+    AlbedoRoot,
     Depth,
     InOut,
     Input,
@@ -18,7 +19,6 @@ from rendergraph.api import (
     structural,
 )
 
-from ..geometry._surface_textures import AlbedoRoot
 from ._directional import DirectionalSampling
 
 

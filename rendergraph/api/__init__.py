@@ -35,6 +35,7 @@ from rendergraph.steps import StencilFace as StencilFace
 from rendergraph.steps import Steps as Steps
 from rendergraph.steps import ViewMatrices as ViewMatrices
 from rendergraph.textures import Albedo as Albedo
+from rendergraph.textures import AlbedoRoot as AlbedoRoot
 from rendergraph.textures import Any as Any
 from rendergraph.textures import Depth as Depth
 from rendergraph.textures import DisplayColor as DisplayColor

@@ -260,9 +260,9 @@ class _VersionAssignment:
                 text = f"view_index is {index}, but '{port.name}' has {count} views, counted from 0"
                 raise self._refused(recording, request, "RG423", text)
             return table, index
-        name = port.name if isinstance(port, Input) else "view"
+        name = port.name if isinstance(port, Input | InOut) else "view"
         ends = recording.links.get(name, ())
-        if isinstance(port, Input) and port.kind != "view":
+        if isinstance(port, InOut) or (isinstance(port, Input) and port.kind != "view"):
             return (self.graph.textures[ends[0].now].view if ends else None) or CAMERA, index
         return (str(ends[0]) if ends else CAMERA), index
 
@@ -290,7 +290,9 @@ class _VersionAssignment:
                 continue
             if name in recording.own and recording.own[name] in self.graph.empty:
                 continue
-            if isinstance(source, Internal) and not self.written[self.final[recording.own[name]][0]]:
+            updates = type(node.node).update is not Node.update  # which may fill a buffer
+            filled = isinstance(source, Internal) and source.kind == "buffer" and updates
+            if isinstance(source, Internal) and not filled and not self.written[self.final[recording.own[name]][0]]:
                 continue
             reads += self._reads(recording, name, read if isinstance(read, Part) else source.whole)
         present = tuple((f"HAS_{read.name.upper()}", "1") for read in reads)

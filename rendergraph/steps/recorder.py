@@ -438,7 +438,7 @@ class Steps:
     def _check_options(self, options: Mapping[str, Any]) -> None:
         if options.get("view") is not None:
             port = checks.declared_port(self.ports, options["view"], "view")
-            if not isinstance(port, Views | Input):
+            if not isinstance(port, Views | Input | InOut):
                 raise Misuse(f"view is {quoted(port)}; it is a Views port or an input that carries views")
 
     def _invocations(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rendergraph.api import Any as AnyTexel
-from rendergraph.api import Frame, Input, Internal, Node, Output, Radiance, Steps, param
+from rendergraph.api import Frame, Function, Input, Internal, Node, Output, Radiance, Signature, Steps, param
 from rendergraph.errors import InputError
 
 if TYPE_CHECKING:
@@ -319,3 +319,37 @@ def test_a_buffer_that_update_fills_and_a_step_changes_is_never_shared(bench: An
     assert plan.placement["a.number"] != plan.placement["b.number"]
     frame = bench.session.render(pipeline, frames=range(1, 4))
     assert frame["image"].mean() == frame["other"].mean() == 6.0
+
+
+class Offers(Node):
+    """A function of numbers that only `update` writes."""
+
+    level = Function(
+        Signature("level", "float level(int n)", ("n",), "+", "0.0", "A number."),
+        shader="level.glsl",
+        reads=("numbers",),
+        doc="Level.",
+    )
+    numbers = Internal(kind="buffer", bytes=8)
+
+    def record(self, steps: Steps) -> None:
+        """No step: the function is all."""
+
+    def update(self, frame: Frame) -> None:
+        frame.write(self.numbers, np.array([3, 4], np.float32))
+
+
+class Takes(Node):
+    """Calls it."""
+
+    level = Input(Offers.level.signature, kind="function", doc="Level.")
+    color = Output(Radiance, format="r32f", doc="The level.")
+
+
+def test_a_function_reads_what_only_update_writes(draw: Draw) -> None:
+    shaders = {
+        "level.glsl": "layout(std430) readonly buffer numbers { float values[]; };\nfloat level(int n) { return values[n]; }\n",
+        "takes.frag": "out float color; void main() { color = level(1); }",
+    }
+    text = "nodes: {o: {type: offers}, t: {type: takes, inputs: {level: o.level}}}\noutputs: {image: t.color}"
+    assert draw(text, Offers, Takes, shaders=shaders)["image"].max() == 4

@@ -155,6 +155,26 @@ class Through(Node):
         steps.geometry(None, vertex="<depth.vert>", out=self.depth, materials="none")
 
 
+class Onto(Node):
+    """Adds the scene to a depth with the view that it was drawn with."""
+
+    depth = InOut(Depth, format="depth32f", doc="Depth.")
+
+    def record(self, steps: Steps) -> None:
+        steps.geometry(None, vertex="<depth.vert>", out=self.depth, materials="none", view=self.depth)
+
+
+def test_a_continued_texture_brings_its_view(draw: Draw) -> None:
+    scene = CAMERA + "objects: {box: {shape: box, size: [1, 1, 1], at: [0, 0, 10]}}\n"  # behind the camera
+    nodes = "b: {type: back}, t: {type: through, inputs: {view: b.views}}, o: {type: onto, inputs: {depth: t.depth}}"
+    once, twice = (
+        draw(f"nodes: {{{nodes}}}\noutputs: {{depth: {end}}}", Back, Through, Onto, scene=scene)["depth"]
+        for end in ("t.depth", "o.depth")
+    )
+    assert once.max() > 0.0
+    np.testing.assert_array_equal(once, twice)
+
+
 def test_a_node_that_makes_nothing_but_views_is_updated(draw: Draw) -> None:
     scene = CAMERA + "objects: {box: {shape: box, size: [1, 1, 1], at: [0, 0, 10]}}\n"  # behind the camera
     text = "nodes: {b: {type: back}, t: {type: through, inputs: {view: b.views}}}\noutputs: {depth: t.depth}"
