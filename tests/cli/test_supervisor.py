@@ -14,6 +14,8 @@ import pytest
 from rendergraph import activity
 from rendergraph.cli import main
 
+pytestmark = pytest.mark.slow  # each test starts processes, and most wait for some of them to end
+
 # One pixel takes about a quarter of a second, and llvmpipe draws all of them inside of one call.
 SLOW = """/*---
 doc: Burn time.

@@ -23,6 +23,8 @@ from rendergraph.catalog import Catalog
 from rendergraph.cli.app import main
 from rendergraph.resources import shipped_pipelines, shipped_scenes
 
+pytestmark = pytest.mark.slow  # the server takes seconds to start and to end
+
 ROOT = Path(__file__).parents[2]
 PATIENCE = 60.0  # seconds for one answer: node starts slowly on a busy machine
 SETTINGS = {
