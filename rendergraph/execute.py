@@ -217,14 +217,8 @@ class Runner(Struct, eq=False):
             with _author_errors(node, "update"):
                 node.node.update(frame)  # pyright: ignore[reportArgumentType]  # a cached_property is one to mypy
             updates[node.id] = perf_counter() - before
-        restored = executable.kept.keys() - executable.due  # kept values that other pipelines may have left
-        uploads = executable.uploads.items()
-        stale = {key: up for key, up in uploads if up.is_stale and (key not in restored or up.upload.sources)}
-        if stale:
-            executable.computed(stale)  # noted before one of them may fail
-        for key, values in stale.items():
-            with _author_errors(self.graph[key[0]], "the function of an upload"):
-                values.compute()
+        if executable.uploads:
+            self._compute_uploads()
         executable.end_updates()
         if not self._complete:
             self._check_views()
@@ -278,6 +272,17 @@ class Runner(Struct, eq=False):
             gpu = timer.milliseconds() if measured else None
             steps.append(StepTime(done.node, cpu * 1e3, gpu, done.index, done.label))
         return FrameTimes(frame_ms, tuple(steps), self.ran)
+
+    def _compute_uploads(self) -> None:
+        executable = self.executable
+        restored = executable.kept.keys() - executable.due  # kept values that other pipelines may have left
+        uploads = executable.uploads.items()
+        stale = {key: up for key, up in uploads if up.is_stale and (key not in restored or up.upload.sources)}
+        if stale:
+            executable.computed(stale)  # noted before one of them may fail
+        for key, values in stale.items():
+            with _author_errors(self.graph[key[0]], "the function of an upload"):
+                values.compute()
 
     def activate(self) -> None:
         """Write what holds for all frames; needed once, and again when another pipeline used the programs."""

@@ -56,9 +56,8 @@ def _meant(name: str, context: click.Context) -> str:
     own = _options(context.command)
     for advice, words in MEANINGS.items():
         if word in words.split():
-            picture = (
-                advice.startswith("-o ") and "." in advice and context.command.name != "run"
-            )  # other verbs write other files
+            # Other verbs than `run` write other files than pictures.
+            picture = advice.startswith("-o ") and "." in advice and context.command.name != "run"
             known = advice.startswith("rendergraph") or (advice.partition(" ")[0] in own and not picture)
             return f"; did you mean '{advice}'" + ("?" if known else " of `rendergraph run`?")
     for reason, words in NEEDLESS.items():

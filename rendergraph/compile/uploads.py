@@ -62,7 +62,7 @@ class UploadedValues(Struct, eq=False):
         (write,) = self.step().writes
         assert self._array is not None
         if write.use == "buffer":
-            self.memory.buffer(write.resource, parity).write(self._array.tobytes())
+            self.memory.buffer(write.resource, parity).write(self._array)
         else:
             texture = self.memory.texture(write.resource, parity)
             textures.upload(self.memory.device, texture, self._array, mip=write.mip or 0, layer=write.layer)

@@ -273,7 +273,7 @@ def find_old_names(source: SourceText, include_folder: Path) -> tuple[dict[str, 
     """Return macros for the old names that plugins' files use, and a warning (RG449) for each."""
     macros: dict[str, str] = {}
     warnings: list[Problem] = []
-    shipped = str(include_folder.parent)
+    shipped = f"{include_folder.parent}/"
     own = [file for file in source.files if not str(file).startswith(shipped)]
     shared = SourceText(tuple(block for block in source.blocks if own and block.origin.file not in own)).text
     for file, (old, new) in product(own, _old_names(include_folder).items()):
