@@ -67,8 +67,10 @@ SHADERS = {
             if (i > 0u) return;
             count[3] = total;  // the second triple: one group for each point
             count[4] = count[5] = 1u;
-            command[0] = total;  // the first of three commands; the others stay empty
-            command[1] = 1u;
+            command[0] = total / 2u;  // half of the points by the first of three commands, none by the second
+            command[10] = total - total / 2u;
+            command[12] = total / 2u;  // the first index
+            command[1] = command[11] = 1u;
         }""",
     "heights.comp": """layout(local_size_x = 1) in;
         layout(std430) readonly buffer kept { uint points[]; };
