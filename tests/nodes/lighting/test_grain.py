@@ -50,6 +50,16 @@ def test_pbr_draws_the_grain_and_nothing_else_changes(
     np.testing.assert_array_equal(with_grain[:, right], even[:, right])
 
 
+def test_without_a_grain_the_anisotropic_model_is_pbr_with_exact_visibility(
+    session: rg.Session, scenes: tuple[Path, Path]
+) -> None:
+    one, other = (
+        radiance(session, "forward", scenes[1], *sets)
+        for sets in (("light.smith=exact",), ("light.shading=anisotropic",))
+    )
+    np.testing.assert_allclose(one, other, rtol=2e-3, atol=1e-3)
+
+
 def test_a_grain_that_comes_with_time(session: rg.Session, tmp_path: Path) -> None:
     """A material without one at first has it where keyframes say so."""
     dark = SCENE.replace("environment: {file: studio}\n", "")
