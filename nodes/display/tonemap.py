@@ -8,17 +8,37 @@ from __future__ import annotations
 
 from typing import Literal
 
-from rendergraph.api import DisplayColor, ExposureGain, Input, Node, Output, Radiance, define, param
+from rendergraph.api import (
+    Any,
+    DisplayColor,
+    ExposureGain,
+    Input,
+    Internal,
+    Node,
+    Output,
+    Radiance,
+    Steps,
+    define,
+    param,
+)
+
+ACES2_SIDE = 65
+"""Entries of the table of `aces2` along each channel: then 99 % of the values are within a step of 8 bits."""
 
 
 class Tonemap(Node):
     """Map scene-linear radiance to display values.
 
-    Exposure is applied first, then the tone curve, then the sRGB transfer function. Some curves preserve hues, because
-    they work on luminance: `reinhard_luminance` is x/(1+x), and `reinhard_extended` the same with a white point
-    (Reinhard et al. 2002); `neutral` (Khronos PBR Neutral, 2024) leaves base colours below 0.8 unchanged. Others work
-    on each channel, so that bright colours fade to white: `reinhard` is x/(1+x), `aces` is Narkowicz's fit (2015),
-    `hable` is Hable's filmic curve (2010). `none` clips.
+    Exposure and white balance are applied first, then contrast and saturation, the tone curve, and the sRGB transfer
+    function. Some curves preserve hues, because they work on luminance: `reinhard_luminance` is x/(1+x), and
+    `reinhard_extended` the same with a white point (Reinhard et al. 2002); `neutral` (Khronos PBR Neutral, 2024) leaves
+    base colours below 0.8 unchanged. Others work on each channel, so that bright colours fade to white: `reinhard` is
+    x/(1+x), `aces` is Narkowicz's fit (2015), `hable` is Hable's filmic curve (2010). `agx` (Sobotka 2022, in Blender's
+    form) and `aces2` (the output transform of ACES 2.0, 2024, which OpenColorIO computes into a table) do the same
+    without bending hues. `none` clips.
+
+    White balance is a von Kries adaptation in the cone space of Bradford (Lam 1985). Both whites are blackbodies (fit
+    by Kim et al. 2002), so 6500 K changes nothing.
 
     The picture has 8 bits per channel, which show as bands in slow gradients. `dither` adds a fraction of a step before
     rounding, the same at a pixel in all frames and pictures: equal values stay equal, exact 8-bit values are unchanged,
@@ -36,14 +56,41 @@ class Tonemap(Node):
         doc="Factor in addition to `exposure`, such as that of automatic exposure.",
     )
     color = Output(DisplayColor, format="rgba8", doc="Display-referred colour, sRGB encoded; alpha is 1.")
+    curve_table = Internal(
+        Any, kind="texture3d", format="rgba16", size=(ACES2_SIDE, ACES2_SIDE), layers=ACES2_SIDE, kept=True
+    )
 
     exposure: float = param(default=0.0, unit="EV", min=-32, max=32, doc="Stops added before the curve.")
-    curve: Literal["neutral", "aces", "reinhard", "reinhard_luminance", "reinhard_extended", "hable", "none"] | str = (
-        define(default="neutral", doc="Tone curve after exposure.", choices="curve")
+    white_balance: float = param(
+        default=6500.0,
+        unit="K",
+        min=1667,
+        max=25000,
+        doc="Colour temperature of the light that is to look white, as on a camera; below 6500 the picture gets bluer.",
     )
+    contrast: float = param(default=1.0, min=0, max=4, doc="Slope in stops around middle grey (0.18), which stays.")
+    saturation: float = param(default=1.0, min=0, max=4, doc="0 is grey, 1 leaves colours as they are.")
+    curve: (
+        Literal[
+            "neutral", "agx", "aces", "aces2", "reinhard", "reinhard_luminance", "reinhard_extended", "hable", "none"
+        ]
+        | str
+    ) = define(default="neutral", doc="Tone curve after exposure.", choices="curve", needs=("curve_table",))
     white: float = param(
         default=4.0,
         min=0.01,
         doc="Luminance after exposure that `reinhard_extended` maps to white; brighter light clips.",
     )
     dither: bool = define(default=True, doc="Break up the bands of 8 bits by a pattern that is the same in all frames.")
+
+    def record(self, steps: Steps) -> None:
+        """Record the mapping, and before it the table of a curve that needs one."""
+        if "curve_table" not in steps.needs("curve"):
+            steps.fullscreen("tonemap.frag")
+            return
+        from ._aces2 import table  # OpenColorIO, for this curve alone
+
+        steps.upload(self.curve_table, table(ACES2_SIDE), label="table")
+        steps.fullscreen(
+            "tonemap.frag", radiance=self.radiance, gain=self.gain, curve_table=self.curve_table.sampled("linear")
+        )

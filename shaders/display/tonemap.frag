@@ -13,14 +13,28 @@ uniform sampler2D radiance;  // scene-linear
 uniform sampler2D gain;      // one texel: factor in addition to `exposure`
 #endif
 uniform float exposure;      // stops
+uniform float white_balance; // kelvin
+uniform float contrast;
+uniform float saturation;
 uniform float white;         // luminance after exposure that becomes white, for curves that use it
 out vec4 color;              // display-referred
 
 #include <CURVE>
 #include <srgb.glsl>
+#include <color_temperature.glsl>
+#include <luminance.glsl>
 #if DITHER
 #include <noise.glsl>
 #endif
+
+// White balance, contrast about middle grey and saturation. Values that change nothing are skipped, so that the picture
+// keeps every bit.
+vec3 graded(vec3 c) {
+    if (white_balance != 6500.0) c = max(adapted_to_daylight(c, white_balance), 0.0);
+    if (contrast != 1.0) c = 0.18 * pow(c / 0.18, vec3(contrast));
+    if (saturation != 1.0) c = max(mix(vec3(luminance_of(c)), c, saturation), 0.0);
+    return c;
+}
 
 void main() {
     float scale = exp2(exposure);
@@ -33,7 +47,7 @@ void main() {
         vec3 light = texelFetch(radiance, ivec2(gl_FragCoord.xy), i).rgb;
         broken = broken || any(isnan(light));
         vec3 scene = max(light, 0.0) * scale;
-        sum += clamp(tone_curve(min(scene, 1e9)), 0.0, 1.0);
+        sum += clamp(tone_curve(graded(min(scene, 1e9))), 0.0, 1.0);
     }
     color = vec4(linear_to_srgb(sum / float(RADIANCE_SAMPLES)), 1.0);
 #if DITHER
