@@ -7,7 +7,7 @@ import json
 import os
 import re
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,32 +35,47 @@ _REFERENCE: Schema = {"type": "string", "pattern": "^\\$", "description": "A par
 _WORDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "array": "a list"}
 
 
-def schema(catalog: Catalog, bases: Mapping[str, Mapping[str, str]] = {}) -> Schema:
+Links = Mapping[str, Mapping[str, Sequence[str]]]
+"""The links that fit each input of each node, by id and name, as `link.fitting` returns them."""
+
+
+def schema(catalog: Catalog, bases: Mapping[str, Mapping[str, str]] = {}, links: Links | None = None) -> Schema:
     """Return a draft-07 schema, which is what editors read.
 
     A type that cannot be imported is a legal word without further rules: its plugin's mistake is not the file's.
 
     Args:
         bases: what files extend, as it is written in them, with the types of its nodes by their ids.
+        links: what editors offer as links; others are as legal, as the file may have changed since.
     """
     types: dict[str, type[Node] | None] = dict.fromkeys(catalog.names())
     types |= {found.name: found.cls for found in catalog.usable()[0]}
     rules: dict[str, Schema] = {}
+    needed: dict[str, Schema] = {}
     for name, cls in types.items():
         if cls is not None:
             own = {param: _param(one, catalog.extensions) for param, one in cls.parameters().items()}
             params = _known_names(own, f"'{name}' has no such param.")
             rules[name] = {"properties": {"inputs": _inputs(name, cls), "params": params}}
+            needed[name] = _needed(cls)
     found = file_schema(PIPELINE)
     found["properties"]["nodes"]["additionalProperties"] = {"$ref": "#/definitions/node"}
-    found["definitions"] = {"node": _node(types, rules)}
+    found["definitions"] = {"node": _node(types, rules), "whole_node": _whole_node(needed)}
+    whole = {"properties": {"nodes": {"additionalProperties": {"$ref": "#/definitions/whole_node"}}}}
+    # Neither a file that extends another nor a patch connects everything; both lack one of these.
+    alone = {"required": ["rendergraph", "nodes", "outputs"], "not": {"required": ["extends"]}}
+    conditions: list[Schema] = [{"if": alone, "then": whole}]
     for base, nodes in bases.items():
         known = {id: {"$ref": f"#/definitions/inherited_{name}"} for id, name in nodes.items() if name in rules}
         for name in {*nodes.values()} & {*rules}:  # of this type as long as nothing else is said
             found["definitions"][f"inherited_{name}"] = {"if": {"not": {"required": ["type"]}}, "then": rules[name]}
         condition = {"properties": {"extends": {"const": base}}, "required": ["extends"]}
         then = {"properties": {"nodes": {"properties": known}}}
-        found.setdefault("allOf", []).append({"if": condition, "then": then})
+        conditions.append({"if": condition, "then": then})
+    if links:
+        offered = {id: {"properties": {"inputs": {"properties": _offered(inputs)}}} for id, inputs in links.items()}
+        conditions.append({"properties": {"nodes": {"properties": offered}}})
+    found["allOf"] = conditions
     marked: Schema = as_markdown(found)
     return marked
 
@@ -100,6 +115,37 @@ def _node(types: Mapping[str, type[Node] | None], rules: Mapping[str, Schema]) -
     return found
 
 
+def _whole_node(needed: Mapping[str, Schema]) -> Schema:
+    """Ask for the required inputs of each type, except of a node that is disabled."""
+    rules = [
+        {"if": {"properties": {"type": {"const": name}}, "required": ["type"]}, "then": then}
+        for name, then in needed.items()
+        if then
+    ]
+    off = {"properties": {"enabled": {"const": False}}, "required": ["enabled"]}
+    return {"if": off, "else": {"allOf": rules}}
+
+
+def _needed(cls: type[Node]) -> Schema:
+    """Ask for the inputs without which a node cannot work; a group may stand for its members."""
+    inputs, groups = cls.inputs(), cls.groups()
+    rules: list[Schema] = []
+    for name, port in inputs.items():
+        if not _is_required(port):
+            continue
+        ways = [name, *(group for group, members in groups.items() if name in members)]
+        rules += [{"required": ways} if len(ways) == 1 else {"anyOf": [{"required": [way]} for way in ways]}]
+    return {"required": ["inputs"], "properties": {"inputs": {"allOf": rules}}} if rules else {}
+
+
+def _offered(inputs: Mapping[str, Sequence[str]]) -> Schema:
+    found: Schema = {}
+    for name, links in inputs.items():
+        offer = {"anyOf": [{"enum": [*links]}, {}]} if links else {}
+        found[name] = {**offer, "items": offer}
+    return found
+
+
 def _about(cls: type[Node]) -> str:
     """Its docs, and what others can connect to; lines of a paragraph are joined."""
     doc = re.sub(r"(?<!\n)\n(?![\n ])", " ", inspect.getdoc(cls) or "")
@@ -123,10 +169,15 @@ def _known_names(properties: Schema, message: str) -> Schema:
 
 
 def _link(port: Input | InOut) -> Schema:
-    found = {**_LINK, "description": f"{port.doc} ({_port_type(port)})"}
+    need = ", required" if _is_required(port) else ""
+    found = {**_LINK, "description": f"{port.doc} ({_port_type(port)}{need})"}
     if isinstance(port, Input) and port.many:
         found |= {"type": ["string", "null", "array"], "items": {"type": "string"}}
     return found
+
+
+def _is_required(port: Input | InOut) -> bool:
+    return not port.optional and not (isinstance(port, Input) and port.takes_scene)
 
 
 def _port_type(port: Port) -> str:
@@ -200,7 +251,8 @@ def outdated(pipeline: Path, roots: Roots, catalog: Catalog, plugins: Iterable[P
         return None
     rest = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
     words = [word for plugin in plugins for word in ("--plugin", str(plugin))]
-    bases = {entry["if"]["properties"]["extends"]["const"] for entry in written.get("allOf", ())}
+    conditions = [entry["if"] for entry in written.get("allOf", ()) if "properties" in entry.get("if", {})]
+    bases = {condition["properties"]["extends"]["const"] for condition in conditions}
     if bases - {*shipped_pipelines()}:  # it was written for a file that extends another
         words.append(shown_file(pipeline))
     command = shlex.join(["rendergraph", "schema", *words, "-o", shown_file(os.path.normpath(file))])

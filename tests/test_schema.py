@@ -154,7 +154,8 @@ def test_a_schema_of_a_file_is_written_anew_for_that_file(
     (tmp_path / "mine.yaml").write_text("# $schema=mine.json\nextends: ./base.yaml\n")
     assert main(["schema", "mine.yaml", "-o", "mine.json"]) == 0
     made = json.loads((tmp_path / "mine.json").read_text())
-    bases = {rule["if"]["properties"]["extends"]["const"]: rule["then"]["properties"] for rule in made["allOf"]}
+    rules = [rule for rule in made["allOf"] if "properties" in rule.get("if", {})]
+    bases = {rule["if"]["properties"]["extends"]["const"]: rule["then"]["properties"] for rule in rules}
     assert bases["./base.yaml"]["nodes"]["properties"].keys() == bases["forward"]["nodes"]["properties"].keys() | {
         "fog"
     }
@@ -165,6 +166,51 @@ def test_a_schema_of_a_file_is_written_anew_for_that_file(
     assert "`rendergraph schema mine.yaml -o mine.json` writes it again, with --plugin for 'tone' too" in (
         capsys.readouterr().err
     )
+
+
+RADIANCES = ("light.radiance", "light.diffuse", "gi.radiance", "gi.indirect", "gi.reflected")
+
+
+def test_a_schema_of_a_file_offers_the_links_that_fit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Although the file has mistakes: an unknown parameter, a link of another meaning, a circle."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.yaml").write_text("""
+extends: deferred
+nodes:
+  ao: {type: ssao_hemisphere, inputs: {depth: gbuffer.normal, normal: gbuffer.normal}, params: {radios: 1}}
+  light: {inputs: {occlusion: ao.occlusion}}
+  gi: {type: ssgi, inputs: {gbuffer: gbuffer, radiance: glow.radiance, diffuse: light.diffuse}}
+  glow: {type: bloom, inputs: {radiance: gi.radiance}}
+""")
+    assert main(["schema", "mine.yaml"]) == 0
+    last = json.loads(capsys.readouterr().out)["allOf"][-1]["properties"]["nodes"]["properties"]
+
+    def offered(node: str, name: str) -> list[str]:
+        found: list[str] = last[node]["properties"]["inputs"]["properties"][name]["anyOf"][0]["enum"]
+        return found
+
+    assert offered("ao", "depth") == ["gbuffer.depth"]
+    assert offered("ao", "normal") == ["gbuffer.normal"]
+    assert offered("light", "occlusion") == ["ao.occlusion"]
+    assert offered("gi", "gbuffer") == ["gbuffer"]
+    assert {"light.radiance", "gi.indirect"} <= {*offered("glow", "radiance")} <= {*RADIANCES}
+    assert main(["check", "mine.yaml"]) == 3
+
+
+def test_required_inputs_are_asked_for_in_a_whole_file(made: dict[str, Any]) -> None:
+    fastjsonschema = pytest.importorskip("fastjsonschema")
+    validate = fastjsonschema.compile(made)
+    for wrong in (
+        FORWARD.replace("inputs: {shadow_map: sun.shadow_map}, ", ""),
+        FORWARD.replace("{radiance: glow.radiance}", "{}"),
+    ):
+        with pytest.raises(fastjsonschema.JsonSchemaException, match="must contain"):
+            validate(parse(wrong).root.plain())
+        validate(parse(wrong.replace("rendergraph: 1", "extends: forward")).root.plain())
+    validate(parse(FORWARD.replace("{radiance: glow.radiance}", "{}, enabled: false")).root.plain())
+    assert rules_of(made, "shadow_pcf")["inputs"]["properties"]["shadow_map"]["description"].endswith(", required)")
 
 
 def test_there_is_a_schema_of_files_we_read_alone(capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,7 +12,7 @@ from rendergraph import reference
 from rendergraph.cli import options
 from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import amount, emit, emit_json, say, warn
-from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.errors import InputError, Problem, UsageError, suggestion
 
 if TYPE_CHECKING:
     from rendergraph.session import Selection
@@ -231,17 +231,37 @@ def diff(a: str, b: str, select: options.Select, svg: Path | None, as_json: bool
 
 
 @click.command("schema")
-@click.argument("what", default="pipeline", metavar="[pipeline|scene|sweep|results|results-csv|FILE]")
+@click.argument("what", default="pipeline", metavar="[pipeline|scene|sweep|results|results-csv|FILE|NODE]")
+@click.option("--glsl", is_flag=True, help="Print a shader of NODE as a complete file, for a GLSL checker.")
+@click.option("--shader", metavar="NAME", help="Which shader, if the node has several; with --glsl.")
+@click.option(
+    "--pipeline",
+    metavar="PIPELINE",
+    shell_complete=options.offered("pipelines"),
+    help="Pipeline that has the node NODE; with --glsl.",
+)
 @options.plugin_option
 @click.option("-o", "--output", type=options.NamedPath(dir_okay=False), metavar="FILE", help="Write a file.")
 @options.json_option
-def schema(what: str, plugins: tuple[Path, ...], output: Path | None, as_json: bool) -> None:
-    """Print the JSON Schema of a kind of file.
+def schema(
+    what: str,
+    glsl: bool,
+    shader: str | None,
+    pipeline: str | None,
+    plugins: tuple[Path, ...],
+    output: Path | None,
+    as_json: bool,
+) -> None:
+    """Print the JSON Schema of a kind of file, or a shader in full, for editors.
 
     The schema of pipelines contains all installed nodes, and what shipped pipelines consist of, for files that extend
-    them. FILE is a pipeline: its schema also contains what it extends and its shader files. A node type with errors is
-    included by name only, with a warning. `results` describes the lines of a sweep's results.jsonl; `results-csv` is a
-    Table Schema of its results.csv.
+    them. FILE is a pipeline: its schema also contains what it extends, its shader files, and for each input of its
+    nodes the links that fit. A node type with errors is included by name only, with a warning. `results` describes the
+    lines of a sweep's results.jsonl; `results-csv` is a Table Schema of its results.csv.
+
+    With --glsl, NODE is a node type, which is shown in a small pipeline, a shader file, or a node of --pipeline. What
+    rendergraph writes before a shader's text, and what the shader includes, is in its place, and every line keeps the
+    number that it has in its file, so that another compiler's messages name the lines that you wrote.
 
     \b
     Examples:
@@ -249,7 +269,14 @@ def schema(what: str, plugins: tuple[Path, ...], output: Path | None, as_json: b
       rendergraph schema scene -o scene.schema.json
       rendergraph schema results
       rendergraph schema my.yaml -o rendergraph.schema.json
+      rendergraph schema --glsl tonemap
+      rendergraph schema --glsl ao --pipeline ssao-gtao --shader gtao.frag
     """
+    if (shader or pipeline) and not glsl:
+        raise UsageError(Problem("RG500", "--shader and --pipeline require --glsl"))
+    if glsl:
+        options.put(_shader(what, shader, pipeline, plugins), output, as_json=as_json)
+        return
     if what in ("results", "results-csv"):
         from rendergraph.compare.export.table import csv_schema  # slower to import than the rest
         from rendergraph.compare.store import line_schema
@@ -264,10 +291,31 @@ def schema(what: str, plugins: tuple[Path, ...], output: Path | None, as_json: b
     options.put(json.dumps(document, indent=2, ensure_ascii=False), output, as_json=as_json)
 
 
+def _shader(what: str, shader: str | None, pipeline: str | None, plugins: tuple[Path, ...]) -> str:
+    from rendergraph.catalog import SHADERS, Catalog
+    from rendergraph.session import Selection
+
+    if pipeline is not None:
+        return reference.complete_shader(options.link(Selection(pipeline, plugins=plugins)), what, shader)
+    catalog = Catalog.discover(plugins)
+    warn(catalog.notes)
+    if what.endswith(SHADERS):
+        catalog = catalog.with_file(what, Path(what))
+    if what not in catalog:
+        hint = suggestion(what, catalog.names(), most=0) or "; a node's id needs --pipeline"
+        raise InputError(Problem("RG511", f"there is no node type '{what}'{hint}"))
+
+    def select(name: str) -> Selection:
+        return Selection(name, plugins=plugins)
+
+    linked, node = reference.find_node_of_type(catalog.get(what), catalog, select)
+    return reference.complete_shader(linked, node, shader)
+
+
 def _of_pipelines(what: str, plugins: tuple[Path, ...]) -> Schema:
     from rendergraph.catalog import Catalog
-    from rendergraph.resolve import resolve
-    from rendergraph.schema import base_of, schema, shipped_bases
+    from rendergraph.schema import Links, base_of, schema, shipped_bases
+    from rendergraph.session import Selection, stages
 
     if what != "pipeline" and not Path(what).suffix:
         text = f"unknown schema '{what}'{suggestion(what, _KINDS)}"
@@ -275,11 +323,14 @@ def _of_pipelines(what: str, plugins: tuple[Path, ...]) -> Schema:
     catalog = Catalog.discover(plugins)
     warn(catalog.notes)
     bases = shipped_bases(catalog)
+    links: Links = {}
     if what != "pipeline":
-        spec = resolve(Path(what), catalog=catalog)
+        resolved = stages.resolve(Selection(what, plugins=plugins), catalog)
+        spec = resolved.spec
         bases |= base_of(Path(what), spec)
         catalog = spec.catalog or catalog  # with the shader files it names
-    document = schema(catalog, bases)
+        links = stages.fitting_links(resolved)
+    document = schema(catalog, bases, links)
     warn([problem.as_warning() for problem in catalog.usable()[1]])
     warn(catalog.extensions.warnings)
     return document

@@ -63,6 +63,39 @@ def sketch(
         return graph, error.problems
 
 
+def fitting(
+    spec: PipelineSpec,
+    catalog: Catalog,
+    lights: Sequence[LightFacts] = (),
+    objects: Sequence[ObjectFacts] | None = None,
+    environment: TextureDesc | None = None,
+) -> dict[str, dict[str, list[str]]]:
+    """Return for each input of each node the links that fit it, by id and name; for a group of inputs, ids of nodes.
+
+    A file with mistakes is answered as far as it can be linked.
+    """
+    given = None if objects is None else tuple(objects)
+    linker = _Linker(spec, spec.catalog or catalog, tuple(lights), given, environment, sketching=True)
+    graph = linker.graph()
+    checker = linker.checker
+    ends = {str(end): end for end in checker.textures if end.port in checker.nodes[end.node].type.cls.outputs()}
+    ends |= {name: end for name, end in graph.aliases.items() if end in checker.textures}
+    found: dict[str, dict[str, list[str]]] = {}
+    for id, draft in checker.nodes.items():
+        others = {text: end for text, end in ends.items() if end.node != id}
+        links = {}
+        for name, port in draft.inputs.items():
+            fit = {text: end for text, end in others.items() if checker.fits(draft, port, end)}
+            meant = [text for text, end in fit.items() if checker.textures[end].semantic.name != "any"]
+            links[name] = meant or [*fit]  # what may mean anything fits everywhere, but is rarely looked for
+        for group, members in draft.type.cls.groups().items():
+            needed = [name for name in members if not draft.inputs[name].optional] or members
+            ids = dict.fromkeys(text.rpartition(".")[0] for text in others)
+            links[group] = [one for one in ids if all(f"{one}.{name}" in links[name] for name in needed)]
+        found[id] = links
+    return found
+
+
 def endpoint(graph: Graph, text: str) -> Endpoint:
     """Return the port that `node.port` names, internals included; for taps."""
     if text in graph.aliases:
@@ -99,6 +132,12 @@ class _Linker(Struct, eq=False):
     missing: list[Problem] = []
     problems: list[Problem] = []
     warnings: list[Problem] = []
+    checked: Checker | None = None
+
+    @property
+    def checker(self) -> Checker:
+        assert self.checked is not None  # `graph` has been called
+        return self.checked
 
     def graph(self) -> Graph:
         types = self._types()
@@ -123,12 +162,16 @@ class _Linker(Struct, eq=False):
         textures: dict[Endpoint, TextureInfo] = {}
         if cyclic:
             self.problems += cyclic
+            if self.sketching:
+                textures = self._textures(list(nodes), nodes, infer)
+                self.checked = Checker(nodes, textures, infer, self.catalog)
         else:
             self.problems += needs(nodes, outputs, written) + versions(nodes)
             self._check_subgraph_inputs(nodes, infer)
             self._warn_of_unused_settings(nodes)
             textures = self._textures(order, nodes, infer)
-            self.problems += Checker(nodes, textures, infer, self.catalog).check()
+            self.checked = Checker(nodes, textures, infer, self.catalog)
+            self.problems += self.checked.check()
             self._check_outputs(nodes, outputs, infer)
         members = {name: _member(draft, infer) for name, draft in nodes.items()}
         self.problems += infer.problems if not cyclic else ()

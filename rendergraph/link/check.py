@@ -54,6 +54,11 @@ class Checker(Struct, eq=False):
             for mismatch in self._mismatches(draft, port, source, info):
                 self._report(draft, port, link, mismatch)
 
+    def fits(self, draft: UnlinkedNode, port: Input | InOut, end: Endpoint) -> bool:
+        """Return whether a link to a port would be accepted, sizes aside."""
+        source = self.nodes[end.node].ports[end.port]
+        return next(self._mismatches(draft, port, source, self.textures[end]), None) is None
+
     def _mismatches(
         self, draft: UnlinkedNode, port: Input | InOut, source: Port, info: TextureInfo
     ) -> Iterator[_Mismatch]:

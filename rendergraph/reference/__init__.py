@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rendergraph.reference.node_types import meaning as meaning
     from rendergraph.reference.node_types import output_facts as output_facts
     from rendergraph.reference.node_types import summary as summary
+    from rendergraph.reference.programs import complete_shader as complete_shader
     from rendergraph.reference.programs import describe_program as describe_program
     from rendergraph.reference.programs import describe_programs as describe_programs
     from rendergraph.reference.programs import find_node_of_type as find_node_of_type
@@ -37,7 +38,7 @@ __getattr__, __dir__ = lazy_exports(
         "assets": ("describe_pipeline", "describe_scene", "kind_of"),
         "examples": ("example_file", "example_text"),
         "node_types": ("describe_node", "input_facts", "meaning", "output_facts", "summary"),
-        "programs": ("describe_program", "describe_programs", "find_node_of_type"),
+        "programs": ("complete_shader", "describe_program", "describe_programs", "find_node_of_type"),
         "topics": ("FILE_KINDS", "error_codes", "error_page", "file_keys", "table_of"),
     },
 )

@@ -68,6 +68,45 @@ def describe_programs(linked: Linked, node: str) -> list[dict[str, Any]]:
     return [_describe(linked, expansion, steps, step) for step in steps]
 
 
+def complete_shader(linked: Linked, node: str, shader: str | None) -> str:
+    """Return one shader of a node as GLSL that any compiler takes, includes resolved.
+
+    `#line` gives each line the number that it has in its file: string 0 is the shader, so messages about it name the
+    author's own lines; the strings of other files are listed after `#version`, and the last is what rendergraph writes.
+
+    Args:
+        shader: the file's name; by default the one that is named after the node type, or the only one.
+    """
+    found: dict[str, Any] = {}
+    for program in describe_programs(linked, node):
+        for stage, name in program["shaders"].items():
+            found.setdefault(name, program["stages"][stage])
+    stem = next(one.type for one in linked.graph.nodes if one.id == node).word
+    of_node = [name for name in found if not name.startswith("<")] or [*found]
+    of_node = [name for name in of_node if name in (f"{stem}.frag", f"{stem}.comp")] or of_node
+    if shader is None and len(of_node) > 1:
+        text = f"'{node}' has several shaders; choose one with --shader: {', '.join(of_node)}"
+        raise UsageError(Problem("RG500", text))
+    name = shader or of_node[0]
+    if name not in found:
+        text = f"--shader: '{node}' has no shader '{name}'; available: {', '.join(found)}"
+        raise UsageError(Problem("RG500", text + suggestion(name, found, most=0)))
+    lines, origins = found[name]["text"].split("\n"), found[name]["origins"]
+    ending = Path(name.strip("<>")).name
+    own = next(one["file"] for one in reversed(origins) if one["file"] and Path(one["file"]).name == ending)
+    files = dict.fromkeys([own, *(one["file"] for one in origins if one["file"]), None])
+    strings = {file: number for number, file in enumerate(files)}
+    legend = [f"// string {number}: {file or 'written by rendergraph'}" for file, number in strings.items()]
+    output, last = [lines[0], *legend], (None, 0)
+    for line, one in zip(lines[1:], origins[1:], strict=False):
+        here = one["file"], one["line"]
+        if here[0] != last[0] or (here[0] is not None and here[1] != last[1] + 1):
+            output.append(f"#line {here[1] or 1} {strings[here[0]]}")
+        output.append(line)
+        last = here
+    return "\n".join(output) + "\n"
+
+
 def _steps_with_program(linked: Linked, node: str) -> tuple[Expansion, list[Step]]:
     types = {one.id: one.type for one in linked.graph.nodes}
     if node not in types:

@@ -121,6 +121,16 @@ def sketch(resolved: Resolved) -> Linked:
         return Linked(**asdict(resolved), scene=scene, graph=graph, missing=(*missing, *unread))
 
 
+def fitting_links(resolved: Resolved) -> dict[str, dict[str, list[str]]]:
+    """Return the links that fit each input, see `link.fitting`, although the file or its scene may be wrong."""
+    try:
+        scene = scene_of(resolved)
+    except InputError:
+        scene = complete(Scene("missing"))
+    facts = light_facts(scene), object_facts(scene), environment_facts(scene)
+    return rendergraph.link.fitting(resolved.spec, resolved.catalog, *facts)
+
+
 def expand(linked: Linked, options: RenderOptions = RenderOptions()) -> Expanded:
     """Record the steps of all requested outputs."""
     requests = requested_outputs(linked.graph, options)

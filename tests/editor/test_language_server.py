@@ -379,6 +379,43 @@ def test_scenes_are_completed_and_checked(editor: Editor, desk: Path) -> None:
     assert editor.hover(desk, SCENE.replace("radius", "|radius")).startswith("Radius.\n\nDefault 0.5 m.")
 
 
+# --- links -----------------------------------------------------------------------------------------------------------
+
+
+def test_links_of_a_named_file_are_offered_by_meaning(editor: Editor, desk: Path) -> None:
+    """Also where the file has a mistake; links to nodes that were added since are as legal as before."""
+    text = changed("  display:", "  glow: {type: ./pass.yaml, inputs: {radiance: light.radiance}}\n  display:")
+    text = text.replace("rendergraph.schema", "links.schema").replace("taps: 5", "tips: 5")
+    (desk / "pass.yaml").write_text(
+        "rendergraph: 1\ninputs: {radiance: {semantic: radiance}}\n"
+        "nodes: {bloom: {type: bloom, inputs: {radiance: inputs.radiance}}}\noutputs: {radiance: bloom.radiance}\n"
+    )
+    (desk / "named.yaml").write_text(text)
+    assert main(["schema", str(desk / "named.yaml"), "-o", str(desk / "links.schema.json")]) == 0
+    text = text.replace("tips", "taps")
+    assert editor.marks(desk, text) == []
+    depths = editor.offers(desk, text.replace("sun.shadow_map", "|"))
+    assert depths.keys() - {"null"} == {"sun.shadow_map"}
+    light = editor.offers(
+        desk, text.replace("tonemap, inputs: {radiance: light.radiance", "tonemap, inputs: {radiance: |")
+    )
+    assert {"light.radiance", "glow.radiance"} <= light.keys()
+    assert not {"sun.shadow_map", "light.surface_depth", "shadows.lookup"} & light.keys()
+    lookups = editor.offers(desk, text.replace("[shadows.lookup]", "[|]"))
+    assert {key for key in lookups if "." in key} == {"shadows.lookup"}
+    assert editor.marks(desk, text.replace("sun", "moon")) == []
+
+
+def test_required_inputs_are_marked(editor: Editor, desk: Path) -> None:
+    ((line, message),) = editor.marks(desk, changed("inputs: {shadow_map: sun.shadow_map}", "inputs: {}"))
+    assert line == line_of("    inputs: {shadow_map")
+    assert message == 'Missing property "shadow_map".'
+    ((_, message),) = editor.marks(desk, changed(", inputs: {radiance: light.radiance}", ""))
+    assert message == 'Missing property "inputs".'
+    off = changed("tonemap, inputs: {radiance: light.radiance}", "tonemap, enabled: false")
+    assert editor.marks(desk, off) == []
+
+
 # --- hover -----------------------------------------------------------------------------------------------------------
 
 
@@ -394,7 +431,7 @@ def test_scenes_are_completed_and_checked(editor: Editor, desk: Path) -> None:
             "|shadow_pcf",
             "Filter the results of depth tests: percentage-closer filtering.\n\nThe visibility is the mean",
         ),
-        ("{|shadow_map: sun", "Depth from the lights. (shadow\\_map, texture2d\\_array)"),
+        ("{|shadow_map: sun", "Depth from the lights. (shadow\\_map, texture2d\\_array, required)"),
         ("|size", "Width and height in pixels."),
         ("|outputs", "Output name to `node.port`."),
     ],
@@ -407,7 +444,7 @@ def test_hovering_shows_the_docs(editor: Editor, desk: Path, at: str, shown: str
 
 
 def test_nodes_of_a_plugin_are_known_like_the_others(editor: Editor, desk: Path) -> None:
-    fog = "  fog: {type: fog, inputs: {radiance: light.radiance}, params: {density: 0.1}}\n"
+    fog = "  fog: {type: fog, inputs: {radiance: light.radiance, depth: light.surface_depth}, params: {density: 0.1}}\n"
     without = PIPELINE.replace("  display:", fog + "  display:")
     assert [line for line, _ in editor.marks(desk, without)] == [line_of("  display:")]
     text = without.replace("rendergraph.schema", "plugins.schema")
@@ -417,9 +454,8 @@ def test_nodes_of_a_plugin_are_known_like_the_others(editor: Editor, desk: Path)
     assert editor.hover(desk, text.replace("density", "|density")).startswith(
         "Part of the light lost in a metre.\n\nDefault 0.05 1/m, from 0 to 10. "
     )
-    assert editor.offers(desk, text.replace("light.radiance}, params", "light.radiance, de|}, params")).keys() == {
-        "depth"
-    }
+    offers = editor.offers(desk, text.replace("depth: light.surface_depth}, params", "de|}, params"))
+    assert offers.keys() == {"depth"}
 
 
 def test_a_shader_file_is_known_by_its_header_and_by_its_path(editor: Editor, desk: Path) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import rendergraph as rg
+from rendergraph.cli.app import main
 from rendergraph.program import positions_macro, stage_texts
 from rendergraph.program.scope import annotated
 from rendergraph.program.variants import variants
@@ -73,6 +74,53 @@ def test_every_program_is_taken(name: str, tmp_path: Path) -> None:
     new = [texts for texts in programs(rg.load(name)) if frozenset(texts.items()) not in _taken]
     _taken.update(frozenset(texts.items()) for texts in new)
     assert not "".join(refused(texts, tmp_path / str(number)) for number, texts in enumerate(new))
+
+
+def checked(capsys: pytest.CaptureFixture[str], node: str, *words: str, stage: str = "frag") -> str:
+    """Return what the compiler says about a shader as `rendergraph schema --glsl` prints it."""
+    assert main(["schema", "--glsl", node, *words]) == 0
+    command = [str(GLSLANG), "--stdin", "-S", stage]
+    return subprocess.run(command, input=capsys.readouterr().out, capture_output=True, text=True, check=False).stdout
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "tonemap",
+        "ssgi --shader discs.frag",
+        "bloom",
+        "light --pipeline forward",
+        "environment_light --shader environment_cells.comp",
+    ],
+)
+def test_an_editors_checker_takes_a_shader_of_ours(words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    said = checked(capsys, *words.split(), stage="comp" if ".comp" in words else "frag")
+    assert said == ""
+
+
+def test_an_editors_checker_names_the_line_of_a_mistake(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    lines = [
+        "/*---",
+        "inputs: {radiance: {semantic: radiance}}",
+        "outputs: {dimmed: {like: radiance}}",
+        "---*/",
+        "#include <luminance.glsl>",
+        "uniform sampler2D radiance;",
+        "uniform float share = 0.5;",
+        "out vec4 dimmed;",
+        "void main() {",
+        "    vec3 light = texelFetch(radiance, ivec2(gl_FragCoord.xy), 0).rgb;",
+        "    dimmed = vec4(share * luminance_of(light));",
+        "}",
+    ]
+    shader = tmp_path / "dim.frag"
+    shader.write_text("\n".join(lines))
+    assert checked(capsys, "./dim.frag") == ""
+    shader.write_text("\n".join(lines).replace("vec4(share *", "vec4(shore *"))
+    assert "ERROR: 0:11: 'shore' : undeclared identifier" in checked(capsys, "./dim.frag")
 
 
 def test_a_fault_is_found(tmp_path: Path) -> None:
