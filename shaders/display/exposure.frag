@@ -1,20 +1,49 @@
-// Adapts to the log-average luminance over time, and derives the exposure.
+// Adapts to the picture's average luminance over time, and derives the exposure.
 #include <frame.glsl>
 
+#if METHOD == METHOD_HISTOGRAM
+layout(std430) readonly buffer histogram { uint bins[BINS]; };
+uniform float low_percentile;
+uniform float high_percentile;
+#else
 uniform sampler2D log_mean;      // one texel: weighted logarithm, weight
+#endif
 #ifdef HAS_BEFORE
 uniform sampler2D before;        // one texel: adapted luminance of the previous frame, 0 in the first
 #endif
 uniform float key;
+uniform float limit;             // stops
+uniform float compensation;      // stops
 uniform float start;             // luminance in the first frame; 0: the picture's own
 uniform float seconds_to_light;
 uniform float seconds_to_dark;
 out float luminance;
 out float gain;
 
-void main() {
+// The picture's average luminance; 0 if nothing counts.
+float average_luminance() {
+#if METHOD == METHOD_HISTOGRAM
+    float total = 0.0;
+    for (int i = 0; i < BINS; ++i) total += float(bins[i]);
+    float low = total * low_percentile / 100.0, high = total * high_percentile / 100.0;
+    float below = 0.0, weights = 0.0, stops = 0.0;
+    for (int i = 0; i < BINS; ++i) {
+        float count = float(bins[i]);
+        float inside = max(min(below + count, high) - max(below, low), 0.0);  // the part between the percentiles
+        stops += inside * (float(i) + 0.5);
+        weights += inside;
+        below += count;
+    }
+    return weights > 0.0 ? exp2(stops / weights / BINS_PER_STOP + FIRST_STOP) : 0.0;
+#else
     vec2 weighted = texelFetch(log_mean, ivec2(0), 0).xy;
-    float target = weighted.y > 0.0 ? exp(weighted.x / weighted.y) : key;  // an empty picture has a gain of 1
+    return weighted.y > 0.0 ? exp(weighted.x / weighted.y) : 0.0;
+#endif
+}
+
+void main() {
+    float target = average_luminance();
+    if (target == 0.0) target = key;  // an empty picture has a gain of 1
 #ifdef HAS_BEFORE
     float previous = texelFetch(before, ivec2(0), 0).r;
     if (previous > 0.0) {
@@ -25,5 +54,5 @@ void main() {
     }
 #endif
     luminance = target;
-    gain = key / target;
+    gain = clamp(key / target, exp2(-limit), exp2(limit)) * exp2(compensation);
 }

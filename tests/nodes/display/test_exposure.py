@@ -68,6 +68,47 @@ def test_one_bright_pixel_weighs_the_same_wherever_it_is(draw: Draw) -> None:
         np.testing.assert_allclose(draw(picture, nodes())["luminance"], [[[expected]]], rtol=RELATIVE)
 
 
+def metered(picture: Floats, low: float, high: float, center: float) -> float:
+    """The average that `method: histogram` finds, by sorting: stops in bins of 1/8, weights in steps of 1/15."""
+    height, width = picture.shape[:2]
+    y, x = np.meshgrid(
+        (np.arange(height) + 0.5) / height * 2 - 1, (np.arange(width) + 0.5) / width * 2 - 1, indexing="ij"
+    )
+    weights = np.floor(15 * (1 - center + center * np.exp(-2 * (x * x + y * y))) + 0.5).reshape(-1)
+    stops = np.clip(np.floor((np.log2(luminance(picture)).reshape(-1) + 16) * 8), 0, 255)
+    order = np.argsort(stops, kind="stable")
+    ends = np.cumsum(weights[order])
+    begins = ends - weights[order]
+    share = np.minimum(ends, high / 100 * ends[-1]) - np.maximum(begins, low / 100 * ends[-1])
+    share = np.maximum(share, 0)
+    return float(2 ** ((share * (stops[order] + 0.5)).sum() / share.sum() / 8 - 16))
+
+
+@pytest.mark.parametrize(("low", "high", "center"), [(0, 100, 0), (50, 95, 0.5), (20, 60, 1)])
+def test_histogram(draw: Draw, low: float, high: float, center: float) -> None:
+    picture = np.exp(np.random.default_rng(3).normal(-1, 2, (37, 53, 3))).astype(np.float32)
+    params: dict[str, Any] = {"low_percentile": low, "high_percentile": high, "center_weight": center}
+    frame = draw(picture, nodes(method="histogram", **params))
+    expected = metered(picture, low, high, center)
+    np.testing.assert_allclose(frame["luminance"], [[[expected]]], rtol=1e-4)
+    np.testing.assert_allclose(frame["gain"], [[[0.18 / expected]]], rtol=1e-4)
+
+
+def test_black_surroundings_and_a_lamp_do_not_decide(draw: Draw) -> None:
+    """A grey card that fills the upper half of the histogram comes out as the key, whatever is around it."""
+    picture = np.full((20, 20, 3), 0.3, np.float32)
+    picture[:, :8] = 0
+    picture[0, 8:12] = 1e4
+    gain = draw(picture, nodes(method="histogram", center_weight=0))["gain"].item()
+    assert gain * 0.3 == pytest.approx(0.18, rel=2 ** (1 / 16) - 1)
+
+
+def test_limit_and_compensation(draw: Draw, noise: Noise) -> None:
+    for factor, expected in ((1e-6, 2**1.5), (1e6, 2**-1.5)):
+        frame = draw(noise(9, 9) * np.float32(factor), nodes(limit=1.5, compensation=1, delta=1e-9))
+        np.testing.assert_allclose(frame["gain"], [[[2 * expected]]], rtol=1e-6)
+
+
 def test_a_brighter_scene_has_that_much_more_and_looks_the_same(draw: Draw, reference: dict[str, Floats]) -> None:
     picture = reference["picture"].astype(np.float32)
     once = draw(picture, nodes(delta=1e-7))
