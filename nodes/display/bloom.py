@@ -39,7 +39,7 @@ class Bloom(Node):
         default=1.0, min=0, doc="Luminance, after `gain`, above which light glows; 1 is the display's white."
     )
     intensity: float = param(
-        default=0.25, min=0, max=16, doc="Fraction of the light above the threshold that is added."
+        default=0.05, min=0, max=16, doc="Fraction of the light above the threshold that is added."
     )
     radius: int = param(
         default=6, unit="texels", min=0, max=32, doc="Radius of the blur of each level, three standard deviations."

@@ -54,14 +54,14 @@ class Exposure(Node):
         default="covered", doc="Average pixels weighted by coverage (alpha), or all pixels equally."
     )
     low_percentile: float = param(
-        default=50.0,
+        default=30.0,
         unit="%",
         min=0,
         max=100,
         doc="`histogram`: this share of the pixels, the darkest, does not count.",
     )
     high_percentile: float = param(
-        default=95.0, unit="%", min=0, max=100, doc="`histogram`: pixels brighter than this share do not count."
+        default=90.0, unit="%", min=0, max=100, doc="`histogram`: pixels brighter than this share do not count."
     )
     center_weight: float = param(
         default=0.5, min=0, max=1, doc="`histogram`: 0 counts all places equally, 1 hardly counts the corners."

@@ -41,18 +41,24 @@ float average_luminance() {
 #endif
 }
 
+// Within the limits already before the eye adapts, or it would spend time where no exposure follows it.
+float limited(float average) {
+    return clamp(average, key * exp2(-limit), key * exp2(limit));
+}
+
 void main() {
     float target = average_luminance();
     if (target == 0.0) target = key;  // an empty picture has a gain of 1
+    target = limited(target);
 #ifdef HAS_BEFORE
     float previous = texelFetch(before, ivec2(0), 0).r;
     if (previous > 0.0) {
         float seconds = target > previous ? seconds_to_light : seconds_to_dark;
         target = mix(target, previous, seconds > 0.0 ? exp(-delta_time / seconds) : 0.0);
     } else if (start > 0.0) {
-        target = start;
+        target = limited(start);
     }
 #endif
     luminance = target;
-    gain = clamp(key / target, exp2(-limit), exp2(limit)) * exp2(compensation);
+    gain = key / target * exp2(compensation);
 }
