@@ -9,7 +9,7 @@ from msgspec import Struct, field
 from msgspec.structs import astuple
 
 from rendergraph.errors import SceneError, suggestion
-from rendergraph.textures import BufferDesc, EnvironmentMap, Layout, Semantic, TextureDesc
+from rendergraph.textures import BufferDesc, EnvironmentMap, Layout, SceneData, Semantic, Signature, TextureDesc
 
 SELECTIONS: Mapping[str, Callable[[bool, bool], bool]] = {
     "all": lambda casts, blended: True,
@@ -137,7 +137,7 @@ class TextureInfo(Struct, frozen=True, gc=False):
         semantic: its meaning, after `any` and `like` are followed.
         view: the id of the view table it is drawn with (`camera`, or `node.port`), None if not drawn.
         lights: the scene's light index of each layer or view, empty if they belong to no lights.
-        bytes: size of a buffer, 0 for textures.
+        bytes: size of a buffer, or of the scene's data; 0 for textures.
         views: number of views of a table of views, 0 for everything else.
         element: what a buffer holds, if its port declares it.
     """
@@ -167,6 +167,22 @@ class TextureInfo(Struct, frozen=True, gc=False):
         return self.desc is not None or self.bytes > 0
 
 
+class SceneDataFacts(Struct, frozen=True):
+    """What inputs of `SceneData` bring along.
+
+    Attributes:
+        bytes: of all buffers and texture arrays, without the blocks of lights and materials that every scene has.
+        triangles: of all objects.
+        emitters: triangles that emit light in some frame, of objects that are not hidden.
+        textures: the arrays that hold the materials' textures.
+    """
+
+    bytes: int = 0
+    triangles: int = 0
+    emitters: int = 0
+    textures: tuple[TextureDesc, ...] = ()
+
+
 class Facts(Struct, frozen=True):
     """What a node knows before the schedule; lights and objects are in the scene's order.
 
@@ -174,6 +190,7 @@ class Facts(Struct, frozen=True):
         viewport: width and height of the picture.
         inputs: what each connected input carries; a `many` input has one entry a link.
         environment: the environment map as it is uploaded; None if the scene has none.
+        scene_data: what inputs of `SceneData` read; None if no node has one.
     """
 
     viewport: tuple[int, int]
@@ -181,11 +198,15 @@ class Facts(Struct, frozen=True):
     inputs: Mapping[str, tuple[TextureInfo, ...]] = field(default_factory=dict)
     objects: tuple[ObjectFacts, ...] = ()
     environment: TextureDesc | None = None
+    scene_data: SceneDataFacts | None = None
 
-    @property
-    def of_scene(self) -> tuple[TextureInfo, ...]:
-        """What an unconnected input of an environment carries; empty if the scene has none."""
-        return (TextureInfo(self.environment, EnvironmentMap),) if self.environment is not None else ()
+    def of_scene(self, semantic: Semantic | Signature) -> tuple[TextureInfo, ...]:
+        """What an unconnected input of this meaning reads of the scene; empty if the scene has nothing like it."""
+        if semantic == EnvironmentMap and self.environment is not None:
+            return (TextureInfo(self.environment, EnvironmentMap),)
+        if semantic == SceneData and self.scene_data is not None:
+            return (TextureInfo(None, SceneData, bytes=self.scene_data.bytes),)
+        return ()
 
     def casting(self, wanted: str | Sequence[str]) -> tuple[int, ...]:
         """The shadow-casting lights, as indices: `auto`, `all`, a light's name or several; see `casting_lights`."""
@@ -200,7 +221,7 @@ class Facts(Struct, frozen=True):
         return tuple(one for one in self.objects if one.name in names)
 
     def connected(self, name: str) -> bool:
-        """Whether the input is connected, or takes the scene's environment and there is one."""
+        """Whether the input is connected, or takes something of the scene and there is such a thing."""
         return bool(self.inputs.get(name))
 
     def input(self, name: str) -> TextureInfo:

@@ -11,10 +11,21 @@ from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar
 
 from msgspec import Struct
-from msgspec.structs import replace
+from msgspec.structs import force_setattr, replace
 
 from rendergraph.facts import Facts
-from rendergraph.textures import FORMATS, EnvironmentMap, Filter, Kind, Layout, Sampler, Semantic, Signature, Wrap
+from rendergraph.textures import (
+    FORMATS,
+    EnvironmentMap,
+    Filter,
+    Kind,
+    Layout,
+    Sampler,
+    SceneData,
+    Semantic,
+    Signature,
+    Wrap,
+)
 from rendergraph.typecheck import Known, Length, Range, validated
 
 T = TypeVar("T")
@@ -124,6 +135,7 @@ class Input(Port, frozen=True, eq=False):
         use: `sample` it, attach it read-only for the `depth_test`, or load it as an `image`.
         group: the name of the group it belongs to.
         element: the elements that a buffer must have.
+        rays: `SceneData` also brings the tree for `#include <trace.glsl>`.
     """
 
     semantic: Meaning | Called
@@ -141,6 +153,11 @@ class Input(Port, frozen=True, eq=False):
     doc: str = ""
     border: Texel | None = None
     element: Elements | None = None
+    rays: bool = False
+
+    def __post_init__(self) -> None:
+        if isinstance(self.semantic, Semantic) and self.semantic == SceneData:
+            force_setattr(self, "kind", "scene")
 
     def link(self, number: int) -> Part:
         """One texture of an input that takes a list, counted from 0; its name in the shader has no number."""
@@ -157,8 +174,8 @@ class Input(Port, frozen=True, eq=False):
 
     @cached_property
     def takes_scene(self) -> bool:
-        """Whether it reads the scene's environment when unconnected."""
-        return self.semantic == EnvironmentMap
+        """Whether it reads the scene's environment, or the scene's data, when unconnected."""
+        return self.semantic in (EnvironmentMap, SceneData)
 
 
 class WrittenPort(Port, frozen=True, eq=False):

@@ -12,7 +12,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-Kind = Literal["texture2d", "texture2d_array", "texture3d", "texture_cube", "buffer", "view", "function"]
+Kind = Literal["texture2d", "texture2d_array", "texture3d", "texture_cube", "buffer", "view", "function", "scene"]
 MOST_SIDE = 16_384
 """Largest width or height of a picture or texture."""
 GLSL_SHAPES = {"texture2d": "2D", "texture2d_array": "2DArray", "texture3d": "3D", "texture_cube": "Cube"}
@@ -135,6 +135,7 @@ EnvironmentMap = Semantic(
 )
 Any = Semantic("any", "Whatever is connected.")
 View = Semantic("view", "Matrices and size that geometry is drawn with.")
+SceneData = Semantic("scene_data", "The scene as buffers and texture arrays, for `#include <scene.glsl>`.")
 
 SEMANTICS: tuple[Semantic, ...] = tuple(value for value in list(globals().values()) if isinstance(value, Semantic))
 

@@ -51,6 +51,7 @@ from rendergraph.textures import Material as Material
 from rendergraph.textures import Normal as Normal
 from rendergraph.textures import Occlusion as Occlusion
 from rendergraph.textures import Radiance as Radiance
+from rendergraph.textures import SceneData as SceneData
 from rendergraph.textures import Semantic as Semantic
 from rendergraph.textures import ShadowLookup as ShadowLookup
 from rendergraph.textures import ShadowMap as ShadowMap

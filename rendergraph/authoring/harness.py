@@ -143,6 +143,7 @@ def _source(name: str, port: Input | InOut, folder: Path, samples: Samples) -> t
         made = Output(AnyTexel, kind="buffer", bytes=_BUFFER_BYTES, doc="Zeros.")
         return _node("Zeros", made=made, record=lambda self, steps: steps.clear(self.made))
     assert port.kind != "function"  # whose semantic is a signature
+    assert port.kind != "scene"  # which is its own source
     meaning = Radiance if semantic is None or semantic.name == "any" else semantic
     given = port.format if isinstance(port, InOut) and isinstance(port.format, str) else None
     image = isinstance(port, Input) and port.use == "image"

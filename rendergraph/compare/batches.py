@@ -163,7 +163,9 @@ def merge(graphs: Sequence[Graph]) -> tuple[Graph, tuple[dict[str, str], ...]]:
         outputs |= {f"{number}/{name}": _renamed(end, own) for name, end in graph.outputs.items()}
     first = graphs[0]
     merged = Graph(first.name, nodes, outputs, first.size, first.lights, textures)
-    return replace(merged, objects=first.objects, environment=first.environment), names
+    scene_data = next((graph.scene_data for graph in graphs if graph.scene_data is not None), None)
+    of_scene = {"objects": first.objects, "environment": first.environment, "scene_data": scene_data}
+    return replace(merged, **of_scene), names
 
 
 def _renamed(end: Endpoint, names: Mapping[str, str]) -> Endpoint:

@@ -40,6 +40,10 @@ _MOST_PARTS = 64
 """Lists of some of the steps that are remembered."""
 
 
+_OF_INSTANCES = {"scene_instance_block": "instances", "scene_previous_block": "instances before"}
+"""Blocks of the scene's data that change with other sources."""
+
+
 class Draw(Struct, eq=False):
     """One draw call or dispatch with what must be set before it.
 
@@ -252,13 +256,17 @@ class Executable(Struct, eq=False, dict=True):
 
     def steps_for_frame(self, parity: int, *, reuse: bool) -> list[FrameStep]:
         """What a frame runs: all steps, or with `reuse` those whose values are gone or out of date."""
+        changes = self.scene.changes
+        if changes != self._seen:
+            changed = {name for name, count in changes.items() if self._seen.get(name, 0) != count}
+            self.touched |= changed
+            self._seen = dict(changes)
+            if again := {key for key, sources in self._kept_sources.items() if not sources.isdisjoint(changed)}:
+                self.due = self._with_dependents(self.due | again)
+                self.assemble()
         if not reuse or self.due or self._running:  # or the last frame was broken off
             self.reuse.forget()
         self._running = True
-        changes = self.scene.changes
-        if changes != self._seen:
-            self.touched |= {name for name, count in changes.items() if self._seen.get(name, 0) != count}
-            self._seen = dict(changes)
         positions = self.reuse.choose(frozenset(self.touched))
         self.touched.clear()
         if positions is None:
@@ -270,6 +278,14 @@ class Executable(Struct, eq=False, dict=True):
             self._parts[key] = self._listed(parity, positions)
         return self._parts[key]
 
+    @cached_property
+    def _kept_sources(self) -> dict[StepKey, frozenset[Source]]:
+        """What the kept steps that read the scene's data look at; others look at nothing that moves."""
+        if not any(step.reads_scene for step in self.kept.values()):
+            return {}
+        sources = zip(self.steps[0], self._step_sources(), strict=True)
+        return {one.step.key: found for one, found in sources if one.step.key in self.kept and one.step.reads_scene}
+
     def _step_sources(self) -> list[frozenset[Source]]:
         """For each step, what it looks at beside what other steps have made."""
         resources, found = self.plan.resources, []
@@ -278,7 +294,7 @@ class Executable(Struct, eq=False, dict=True):
             blocks = {
                 b for draw in compiled.all_draws for text in draw.program.texts.values() for b in used_blocks(text)
             }
-            views: dict[str, Source] = {"camera_block": ("view", CAMERA)}
+            views: dict[str, Source] = {"camera_block": ("view", CAMERA), **_OF_INSTANCES}
             if step.view is not None:
                 views["pass_view_block"] = "view", step.view
                 views["previous_pass_view_block"] = "view before", step.view

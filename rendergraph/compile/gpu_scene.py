@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -15,6 +15,8 @@ from msgspec import Struct, field
 
 from rendergraph.compile.culling import commands
 from rendergraph.compile.programs import ProgramCache
+from rendergraph.compile.scene_buffers import SceneBuffers
+from rendergraph.expand import SCENE_DATA
 from rendergraph.gl import textures
 from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
@@ -23,6 +25,7 @@ from rendergraph.program.variants import FIXED_BLOCKS, light_macros, scene_macro
 from rendergraph.scene import pack
 from rendergraph.scene.model import ImageSource, MadeImage, Scene, Texture, changed_objects
 from rendergraph.scene.pack import PackedScene, Records
+from rendergraph.scene.scene_data import data_macros, instance_data
 from rendergraph.textures import TextureDesc, full_mip_count
 
 Decode = Callable[[ImageSource, bool], npt.NDArray[Any]]
@@ -83,6 +86,7 @@ class GpuScene(Struct, eq=False, dict=True):
     _blocks: dict[str, tuple[moderngl.Buffer, bool]] = {}
     _environment: GpuTexture | None = None
     _before: moderngl.Buffer | None = None
+    _data: SceneBuffers | None = None
     _stale_instances: set[int] = set()  # objects that have moved since the frame before was kept
 
     def __post_init__(self) -> None:
@@ -138,6 +142,9 @@ class GpuScene(Struct, eq=False, dict=True):
                 write_records(self._instances, packed.instances, moved)
                 self._stale_instances.update(moved.tolist())
                 self.changes["instances"] += 1
+                if self._data is not None:
+                    self._data.instances = instance_data(scene, packed)
+                    write_records(self._data.buffers["scene_instance_block"], self._data.instances, moved)
         self.scene, self.packed = scene, packed
 
     def advance(self) -> None:
@@ -146,6 +153,18 @@ class GpuScene(Struct, eq=False, dict=True):
             write_records(self._before, self.packed.instances, np.array(sorted(self._stale_instances), np.int64))
             self.changes["instances before"] += 1
         self._stale_instances.clear()
+
+    @property
+    def data(self) -> Mapping[str, moderngl.Buffer]:
+        """The buffers of the scene's data by the names of their blocks, uploaded when somebody first asks."""
+        if self._data is None:
+            self._data = SceneBuffers.make(self.device, self.scene, self.packed)
+        return self._data.buffers
+
+    @property
+    def data_defines(self) -> dict[str, str]:
+        """Macros for steps that read the scene's data."""
+        return {**self.defines, **data_macros(self.scene, self.packed)}
 
     def indices(self, topology: str) -> MeshIndices:
         """The indices of `triangles`, or of `triangles_adjacency`, which are found when somebody first draws them."""
@@ -166,11 +185,11 @@ class GpuScene(Struct, eq=False, dict=True):
             used = [name for name, _ in formats if name in names]
             if used:
                 layout = " ".join(f if name in names else _PADDING[f] for name, f in formats)
-                buffer = self._instances if formats is _INSTANCE_FORMAT else self._previous()
+                buffer = self._instances if formats is _INSTANCE_FORMAT else self.previous()
                 content.append((buffer, f"{layout}/i", *used))
         return programs.vertex_array(program, (id(self), "scene", topology), content, self.indices(topology).buffer)
 
-    def _previous(self) -> moderngl.Buffer:
+    def previous(self) -> moderngl.Buffer:
         """Where objects were in the frame before, kept as soon as a program looks at it."""
         if self._before is None:
             self._stale_instances.clear()
@@ -212,6 +231,10 @@ class GpuScene(Struct, eq=False, dict=True):
             self._environment = self._upload(self.decode_light(self.scene.environment.image), srgb=True)
         return self._environment
 
+    def resource(self, id: str) -> GpuTexture | moderngl.Buffer:
+        """What a plan's resource of the scene is: its environment, or one buffer that stands for all its data."""
+        return self.data["scene_instance_block"] if id == SCENE_DATA.port else self.environment()
+
     @property
     def environment_content(self) -> Hashable:
         """What the picture around the scene is decoded from: equal ones give the same texels, also of two scenes."""
@@ -243,6 +266,8 @@ class GpuScene(Struct, eq=False, dict=True):
         for indices in self._indices.values():
             indices.buffer.release()
         self._instances.release()
+        if self._data is not None:
+            self._data.release()
         if self._before is not None:
             self._before.release()
         for image in (*self._images.values(), *([self._environment] if self._environment else [])):

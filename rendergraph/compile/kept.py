@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from msgspec import Struct, field
 
 from rendergraph.compile.executable import step_uniforms
+from rendergraph.expand import SCENE_DATA
 from rendergraph.gl import textures
 from rendergraph.gl.textures import GpuTexture
 from rendergraph.schedule.dependencies import touched_ids
@@ -118,6 +119,8 @@ def contents(executable: Executable) -> Mapping[str, Content]:
             ids = more
         if any(executable.uploads[key].upload.sources for key in makers if key in executable.uploads):
             continue  # made of a scene that changes
+        if SCENE_DATA.port in ids:
+            continue  # likewise
         environment = any(resources[other].role == "scene" for other in ids)
         found[id] = (
             id,

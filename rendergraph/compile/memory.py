@@ -109,12 +109,12 @@ class Memory(Struct, eq=False, dict=True):
     """Everything a pipeline allocates for one size.
 
     `parity` is the frame number's: histories swap their two copies with it. `regions` are those that steps are
-    drawn in, by node and number; `environment` gives the scene's own texture, which the scene keeps.
+    drawn in, by node and number; `of_scene` gives what the scene keeps, by its id.
     """
 
     device: Device
     plan: ResourcePlan
-    environment: Callable[[], GpuTexture]
+    of_scene: Callable[[str], GpuTexture | moderngl.Buffer]
     pool: TexturePool
     physicals: list[GpuTexture | moderngl.Buffer | MemoryBlock] = field(default_factory=list)
     regions: dict[tuple[str, int], Region] = field(default_factory=dict)
@@ -133,7 +133,7 @@ class Memory(Struct, eq=False, dict=True):
                 if physical.block:
                     self.physicals.append(next(made_blocks))
                 elif self._is_scenes(physical):
-                    self.physicals.append(self.environment())
+                    self.physicals.append(self.of_scene(physical.members[0]))
                 elif isinstance(physical.desc, BufferDesc):
                     self.physicals.append(self.device.ctx.buffer(reserve=max(16, physical.desc.bytes)))
                 else:

@@ -29,7 +29,7 @@ from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.gl.queries import OcclusionQuery, Timer
 from rendergraph.gl.textures import Clear, poison_value
-from rendergraph.program import StepTexts, Texts, check_kept_text, positions_macro
+from rendergraph.program import StepTexts, Texts, check_kept_text, declared_blocks, positions_macro
 from rendergraph.program.limits import check_plan, groups_of
 from rendergraph.program.variants import FIXED_BLOCKS, view_count
 from rendergraph.schedule import step_names
@@ -65,7 +65,7 @@ def compile_plan(
         poison: overwrite released textures with a value that no picture should show.
     """
     check_plan(device.limits, plan, views)
-    memory = Memory(device, plan, scene.environment, pool)
+    memory = Memory(device, plan, scene.resource, pool)
     buffers = ViewBuffers(device, views)
     compiler = _Compiler(device, plan, types, views, scene, programs, memory, buffers, poison)
     try:
@@ -305,7 +305,19 @@ class _Compiler(Struct, eq=False, dict=True):
                     before_views[f"{before}previous_{use.name}_view_block"] = view
         blocks |= {name: self.views.previous_binding(table) for name, table in before_views.items()}
         macros = {**self.scene.light_defines, **self._sample_positions(step), **defines}
+        if step.reads_scene:
+            macros |= self.scene.data_defines
         texts = self._texts(step, macros)
+        if step.reads_scene:
+            used = {name for text in texts().values() for _, name, _ in declared_blocks(text.text)}
+            held = dict(self.scene.data)
+            if "scene_previous_block" in used:
+                held["scene_previous_block"] = self.scene.previous()
+                self.uses_previous = True
+            for block in sorted(used & held.keys()):
+                blocks[block] = storage
+                buffers.append(partial(held[block].bind_to_storage_buffer, storage))
+                storage += 1
         program = self.programs.get(texts(), blocks, outputs)
         for name in before_views.keys() & program.block_names:
             self.views.keep_previous(before_views[name])

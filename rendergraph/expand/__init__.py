@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from rendergraph.declare import WrittenPort
 from rendergraph.errors import InputError, Problem
 from rendergraph.expand.model import CAMERA as CAMERA
+from rendergraph.expand.model import SCENE_DATA as SCENE_DATA
 from rendergraph.expand.model import Expansion as Expansion
 from rendergraph.expand.model import VersionedSteps, follow_forwards
 from rendergraph.expand.model import ViewTable as ViewTable

@@ -9,9 +9,14 @@ from msgspec import Struct, field
 from rendergraph.link import Endpoint
 from rendergraph.link.infer import CAMERA as CAMERA
 from rendergraph.steps import Resource, Step
+from rendergraph.textures import EnvironmentMap, SceneData, Semantic, Signature
 
-ENVIRONMENT = Endpoint("", "the scene's environment")
-"""What an input of an environment is linked to that the file links to nothing."""
+SCENE_DATA = Endpoint("", "the scene's data")
+OF_SCENE: Mapping[Semantic | Signature, Endpoint] = {
+    EnvironmentMap: Endpoint("", "the scene's environment"),
+    SceneData: SCENE_DATA,
+}
+"""What an input that reads the scene is linked to where the file links it to nothing."""
 
 
 class ViewTable(Struct, frozen=True):

@@ -13,7 +13,7 @@ from rendergraph.declare import Facts, Function, InOut, Input, Node, Part, Port,
 from rendergraph.declare.blame import author_problem
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Misuse, Problem, SceneError, is_interruption, node_named, suggestion
-from rendergraph.expand.model import ENVIRONMENT
+from rendergraph.expand.model import OF_SCENE
 from rendergraph.glsl.source import needs
 from rendergraph.link import Endpoint, Graph, GraphNode
 from rendergraph.steps import MOST_STEPS, StepRequest, Steps, UniformValue, define_text
@@ -28,7 +28,7 @@ class Recording:
 
     Attributes:
         unfilled: selections of objects it draws that are empty in this scene; left out where that changes nothing.
-        links: connected inputs whose textures have layers; `ENVIRONMENT` stands for the scene's.
+        links: connected inputs whose textures have layers; those to `OF_SCENE` stand for the scene's.
     """
 
     def __init__(self, graph: Graph, node: GraphNode, used: set[str]) -> None:
@@ -42,9 +42,9 @@ class Recording:
             self.links = {
                 name: tuple([e for e in ends if e.now not in graph.empty]) for name, ends in node.inputs.items()
             }
-        if graph.environment is not None:
-            around = [name for name, port in node.type.read.items() if port.takes_scene and not self.links.get(name)]
-            self.links |= dict.fromkeys(around, (ENVIRONMENT,))
+        for name, port in node.type.read.items():
+            if port.takes_scene and not self.links.get(name) and graph.facts.of_scene(port.semantic):
+                self.links[name] = (OF_SCENE[port.semantic],)
         self.own = {name: Endpoint(node.id, name) for name in node.type.written}
         self.defines = define_parameters(node.node, node.choices)
         self.uniforms = param_uniforms(node.node)
@@ -57,15 +57,15 @@ class Recording:
     @cached_property
     def _facts(self) -> Facts:
         graph = self.graph
-        facts = Facts(graph.size, graph.lights, objects=graph.objects or (), environment=graph.environment)
+        read = self.node.type.read
         inputs = {
-            name: facts.of_scene
-            if ends == (ENVIRONMENT,)
+            name: graph.facts.of_scene(read[name].semantic)
+            if ends[0] in OF_SCENE.values()
             else tuple([graph.textures[end.now] for end in ends if end.now in graph.textures])
             for name, ends in self.links.items()
             if ends
         }
-        return replace(facts, inputs=inputs)
+        return replace(graph.facts, inputs=inputs)
 
     def desc(self, port: Port) -> TextureDesc | BufferDesc:
         if isinstance(port, Input):
@@ -86,7 +86,7 @@ class Recording:
         return connected
 
     def _lasts(self, end: Endpoint) -> bool:
-        return end == ENVIRONMENT or is_kept(self.graph[end.node].node.ports()[end.port])
+        return end in OF_SCENE.values() or is_kept(self.graph[end.node].node.ports()[end.port])
 
     def add(self, request: StepRequest) -> None:
         """Keep a request, unless it would draw nothing onto existing contents."""
@@ -150,7 +150,7 @@ class Recording:
                 names.update(used.read_names)
             elif isinstance(used, InOut):  # whether or not a step writes it
                 names.add(name)
-        return [end for name in names for end in self.links.get(name, ()) if end != ENVIRONMENT]
+        return [end for name in names for end in self.links.get(name, ()) if end not in OF_SCENE.values()]
 
 
 def is_kept(port: Port) -> bool:

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from rendergraph.declare import Function, History, InOut, Input, Internal, Node, Part, Port, Views, WrittenPort
 from rendergraph.errors import InputError
-from rendergraph.expand.model import CAMERA, ENVIRONMENT, VersionedSteps, ViewTable, follow_forwards
+from rendergraph.expand.model import CAMERA, OF_SCENE, VersionedSteps, ViewTable, follow_forwards
 from rendergraph.expand.recording import Recording, is_kept
 from rendergraph.expand.targets import overlap, parts_written, refusals, target_size
 from rendergraph.link import Endpoint, Graph
@@ -40,9 +40,10 @@ class _VersionAssignment:
         self.final: dict[Endpoint, tuple[str, int]] = {}
         self.written: dict[str, set[tuple[int, int | None]]] = {}
         self.resources: dict[str, Resource] = {}
-        if graph.environment is not None:
-            self.resources[ENVIRONMENT.port] = Resource(ENVIRONMENT.port, graph.environment, "scene")
-            self.final[ENVIRONMENT] = ENVIRONMENT.port, 0
+        for semantic, end in OF_SCENE.items():
+            for info in graph.facts.of_scene(semantic):
+                self.resources[end.port] = Resource(end.port, info.storage, "scene")
+                self.final[end] = end.port, 0
         self.views: dict[str, ViewTable] = {CAMERA: ViewTable()}
         self.steps: list[Step] = []
         self.forwarded = dict(_forwarded_ports(graph, recordings))
@@ -194,7 +195,7 @@ class _VersionAssignment:
         known = self.resources.get(resource)
         desc = known.desc if known is not None else self.graph.textures[end.now].storage
         if isinstance(desc, BufferDesc):
-            use = "buffer"
+            use = "scene" if end in OF_SCENE.values() else "buffer"
         version = final if version is None else version
         kind = desc.kind if isinstance(desc, TextureDesc) and part.layer is None else "texture2d"
         return Read(name, resource, version, use, sampler, part.mip, part.layer, end.previous, kind)

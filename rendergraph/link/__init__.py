@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from msgspec import Struct
 
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import Facts, LightFacts, TextureInfo
 from rendergraph.errors import InputError, Option, Problem, suggestion
-from rendergraph.facts import ObjectFacts
+from rendergraph.facts import ObjectFacts, SceneDataFacts
 from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.link.check import Checker, port_kind
 from rendergraph.link.connect import Connector
@@ -37,15 +37,17 @@ def link(
     lights: Sequence[LightFacts] = (),
     objects: Sequence[ObjectFacts] | None = None,
     environment: TextureDesc | None = None,
+    scene_data: Callable[[], SceneDataFacts] = SceneDataFacts,
 ) -> Graph:
     """Return the checked graph, or raise with all mistakes, those in `spec.problems` included.
 
     Args:
         lights: the scene's lights in its order; sizes and layers may depend on them.
         objects: the scene's objects; None without a scene, where any may exist.
+        scene_data: called if some node reads the scene's data.
     """
     given = None if objects is None else tuple(objects)
-    return _Linker(spec, spec.catalog or catalog, tuple(lights), given, environment).graph()
+    return _Linker(spec, spec.catalog or catalog, tuple(lights), given, environment, scene_data).graph()
 
 
 def sketch(
@@ -55,7 +57,9 @@ def sketch(
     try:
         return link(spec, catalog, lights, environment=environment), ()
     except InputError as error:
-        linker = _Linker(spec, spec.catalog or catalog, tuple(lights), None, environment, sketching=True)
+        linker = _Linker(
+            spec, spec.catalog or catalog, tuple(lights), None, environment, SceneDataFacts, sketching=True
+        )
         graph = linker.graph()
         lacking = {*linker.missing, *(problem for problem in spec.problems if problem.code == "RG130")}
         if any(problem not in lacking for problem in error.problems):
@@ -128,6 +132,7 @@ class _Linker(Struct, eq=False):
     lights: tuple[LightFacts, ...]
     objects: tuple[ObjectFacts, ...] | None
     environment: TextureDesc | None
+    scene_data: Callable[[], SceneDataFacts]
     sketching: bool = False
     missing: list[Problem] = []
     problems: list[Problem] = []
@@ -156,9 +161,15 @@ class _Linker(Struct, eq=False):
         cyclic = cycles(nodes) if len(order) < len(nodes) else []
         used = {end.source for draft in nodes.values() for links in draft.links.values() for end in links}
         used |= {found.source for found in outputs.values()}
-        infer = TextureInference(
-            nodes, Facts(self.spec.size, self.lights, objects=self.objects or (), environment=self.environment), used
+        reads_scene = any(port.kind == "scene" for draft in nodes.values() for port in draft.inputs.values())
+        facts = Facts(
+            self.spec.size,
+            self.lights,
+            objects=self.objects or (),
+            environment=self.environment,
+            scene_data=self.scene_data() if reads_scene else None,
         )
+        infer = TextureInference(nodes, facts, used)
         textures: dict[Endpoint, TextureInfo] = {}
         if cyclic:
             self.problems += cyclic
@@ -189,6 +200,7 @@ class _Linker(Struct, eq=False):
             aliases=self._aliases(references, written),
             disabled=tuple(name for name, draft in written.items() if draft.spec.disabled is not None),
             environment=self.environment,
+            scene_data=facts.scene_data,
             unlit=tuple(name for name, draft in written.items() if draft.unlit),
             warnings=(*dict.fromkeys(warning for one in types.values() for warning in one.warnings), *self.warnings),
         )

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from msgspec import Struct, field
 
 from rendergraph.catalog import NodeType
-from rendergraph.declare import LightFacts, Node, Texel, TextureInfo
+from rendergraph.declare import Facts, LightFacts, Node, Texel, TextureInfo
 from rendergraph.errors import Place, Problem
-from rendergraph.facts import SELECTIONS, ObjectFacts
+from rendergraph.facts import SELECTIONS, ObjectFacts, SceneDataFacts
 from rendergraph.textures import Sampler, TextureDesc
 
 if TYPE_CHECKING:
@@ -65,6 +65,7 @@ class Graph(Struct, frozen=True, dict=True):
         aliases: outputs of sub-pipelines and of disabled nodes, `glow.radiance`, and the ports they stand for.
         disabled: nodes that `enabled: false` removes; they are not members.
         environment: read by inputs of an environment that have no link.
+        scene_data: likewise, of the scene's data; None if no node has such an input.
         unlit: nodes that need an environment where the scene has none; they are not members either.
     """
 
@@ -79,6 +80,7 @@ class Graph(Struct, frozen=True, dict=True):
     disabled: tuple[str, ...] = ()
     objects: tuple[ObjectFacts, ...] | None = None
     environment: TextureDesc | None = None
+    scene_data: SceneDataFacts | None = None
     unlit: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -90,6 +92,17 @@ class Graph(Struct, frozen=True, dict=True):
 
     def __contains__(self, node: object) -> bool:
         return node in self.members
+
+    @cached_property
+    def facts(self) -> Facts:
+        """What all nodes know of the scene."""
+        return Facts(
+            self.size,
+            self.lights,
+            objects=self.objects or (),
+            environment=self.environment,
+            scene_data=self.scene_data,
+        )
 
     @cached_property
     def unfilled(self) -> frozenset[str]:

@@ -60,8 +60,9 @@ class _LazyInputs(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Sequence[TextureInfo]:
         links = self._draft.links[name]
         if not links:
-            port, given = self._draft.inputs[name], self._infer.scene.of_scene
-            if isinstance(port, Input) and port.takes_scene and given:
+            port = self._draft.inputs[name]
+            given = self._infer.scene.of_scene(port.semantic) if isinstance(port, Input) and port.semantic else ()
+            if given:
                 return given
             raise KeyError(name)
         return _LazyInfos(self._infer, [link.source for link in links])

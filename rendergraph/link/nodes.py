@@ -16,6 +16,7 @@ from rendergraph.errors import InputError, Place, Problem, suggestion
 from rendergraph.link.graph import Endpoint
 from rendergraph.read import NAME, flag, word
 from rendergraph.resolve import NodeSpec, PipelineSpec
+from rendergraph.textures import EnvironmentMap
 
 _ID = NAME.pattern.removesuffix(r"\Z")
 _LINK = re.compile(rf"({_ID}(?:/{_ID})*)(?:\.({_ID}))?(@previous)?\Z")
@@ -194,7 +195,7 @@ def mark_without_environment(nodes: Mapping[str, UnlinkedNode]) -> None:
 def _lacks_environment(draft: UnlinkedNode, nodes: Mapping[str, UnlinkedNode]) -> bool:
     return any(
         isinstance(port, Input)
-        and port.takes_scene
+        and port.semantic == EnvironmentMap
         and not port.optional
         and name not in draft.failed
         and all(nodes[link.source.node].is_removed for link in draft.links[name])

@@ -30,7 +30,9 @@ _MOVING = {
     "material_block": "the scene's materials, which may change",
     "environment_block": "how bright the environment is and how it is turned, which may move",
     "pass_view_block": "the view it is drawn with",
+    "scene_previous_block": "where the objects were in the frame before",
 }
+_OF_SCENE_DATA = ("light_block", "material_block")
 _SAMPLER = r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?([iu]?sampler\w+)\s+([^;]+);"
 _NAME = r"[A-Za-z_]\w*"
 _BRACES = r"(?:\A|(?<=[;{}]))([^;{}]*)\{([^{}]*)\}(?=\s*([A-Za-z_]\w*)?)"
@@ -195,7 +197,8 @@ def check_kept_text(step: Step, texts: Texts, cls: type[Node], resources: Mappin
             problems.append(_placed(problem, text, [name]))
         for _, block, members in blocks:
             used = sorted(names & members)
-            if used and (block in _MOVING or block.endswith("_view_block")):
+            follows = step.reads_scene and block in _OF_SCENE_DATA  # it runs again where those change
+            if used and not follows and (block in _MOVING or block.endswith("_view_block")):
                 what = _MOVING.get(block, "a view, which `update` sets in each frame")
                 problem = step.problem("RG439", f"it makes '{kept}', which is kept, but looks at {what} ('{used[0]}')")
                 problems.append(_placed(problem, text, used))

@@ -12,6 +12,7 @@ from rendergraph.scene import pack
 from rendergraph.scene.facts import selected
 from rendergraph.scene.model import Material, Scene, Texture
 from rendergraph.scene.pack import PackedScene
+from rendergraph.scene.scene_data import data_macros
 from rendergraph.steps import Step
 
 FIXED_BLOCKS = {
@@ -39,6 +40,8 @@ def variants(
     macros = light_macros(scene, stored)
     if step.kind in ("geometry", "draw"):
         macros["PASS_VIEW_COUNT"] = view_count(step, views)
+    if step.reads_scene:
+        macros |= scene_macros(scene, packed, stored) | data_macros(scene, packed)
     if step.kind != "geometry":
         return [macros]
     macros |= scene_macros(scene, packed, stored)

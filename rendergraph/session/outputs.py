@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from rendergraph.errors import InputError, Problem, suggestion
-from rendergraph.expand.model import ENVIRONMENT
+from rendergraph.expand.model import OF_SCENE
 from rendergraph.link import Graph, endpoint
 from rendergraph.session.selection import TEXTURE_PART, RenderOptions
 from rendergraph.session.values import OutputRequest, Planned
@@ -58,7 +58,7 @@ def every_port(planned: Planned) -> tuple[str, ...]:
     graph, expansion = planned.linked.graph, planned.expansion
     held: dict[tuple[str, str], list[str]] = {}
     for end, resource in expansion.ports.items():
-        if end != ENVIRONMENT and graph.textures[end].desc is not None:
+        if end not in OF_SCENE.values() and graph.textures[end].desc is not None:
             held.setdefault((end.node, resource), []).append(str(end))
     written = [
         tap

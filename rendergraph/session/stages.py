@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,7 @@ from rendergraph.errors import InputError, Option, Place, Problem, RendergraphEr
 from rendergraph.scene.animate import complete
 from rendergraph.scene.facts import environment_facts, light_facts, object_facts
 from rendergraph.scene.model import Scene
+from rendergraph.scene.scene_data import scene_data_facts
 from rendergraph.session.outputs import every_port, requested_outputs
 from rendergraph.session.picture_metadata import PictureMetadata, is_picture, read_picture_metadata
 from rendergraph.session.scenes import scene_of
@@ -100,7 +102,14 @@ def link(resolved: Resolved) -> Linked:
         scene = scene_of(resolved)
     except InputError as error:  # the file's own mistakes may be why, such as a plugin that is not installed
         raise InputError([*spec.problems, *error.problems]) from None
-    graph = rendergraph.link.link(spec, catalog, light_facts(scene), object_facts(scene), environment_facts(scene))
+    graph = rendergraph.link.link(
+        spec,
+        catalog,
+        light_facts(scene),
+        object_facts(scene),
+        environment_facts(scene),
+        partial(scene_data_facts, scene),
+    )
     return Linked(**asdict(resolved), scene=scene, graph=graph)
 
 

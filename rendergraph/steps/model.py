@@ -15,7 +15,7 @@ from rendergraph.textures import BufferDesc, Sampler, TextureDesc
 Topology = Literal["points", "lines", "line_strip", "triangles", "triangle_strip", "triangles_adjacency"]
 MaterialLevel = Literal["full", "alpha", "none"]
 DrawOrder = Literal["front_to_back", "back_to_front", "scene"]
-Use: TypeAlias = Literal["sample", "depth_test", "image", "buffer", "attach"]
+Use: TypeAlias = Literal["sample", "depth_test", "image", "buffer", "attach", "scene"]
 UniformValue: TypeAlias = float | int | bool | Sequence[float] | Sequence[int]
 
 MOST_STEPS = 10_000  # of one pipeline
@@ -28,8 +28,8 @@ class Read(Struct, frozen=True, gc=False):
         name: the name in the shader.
         resource: id of the resource, `node.port`.
         version: orders readers and writers of one texture.
-        use: `sample`, `depth_test` (attached read-only), `image`, `buffer` or `attach` (the target of an `InOut`
-            whose old content stays).
+        use: `sample`, `depth_test` (attached read-only), `image`, `buffer`, `attach` (the target of an `InOut`
+            whose old content stays) or `scene` (all of the scene's data).
         mip, layer: the part read, None for all.
         previous: last frame's value; orders nothing in this frame.
         kind: the GLSL view of it, `texture2d` if a single mip or layer is read.
@@ -192,6 +192,11 @@ class Step(Struct, frozen=True, gc=False):
     def key(self) -> tuple[str, int]:
         """Node id and number: unique within a pipeline."""
         return self.node, self.index
+
+    @property
+    def reads_scene(self) -> bool:
+        """Whether it, or a function that it calls, reads the scene's data."""
+        return any(read.use == "scene" for read in self.all_reads)
 
     @property
     def all_reads(self) -> tuple[Read, ...]:

@@ -1,8 +1,7 @@
 // The surface of a fragment of the scene's geometry, from varyings, material factors and textures.
 #include <alpha_mask.glsl>
 #include <base_color.glsl>
-#include <math.glsl>
-#include <surface.glsl>
+#include <material_surface.glsl>
 
 in vec3 v_position;
 #if PASS_SAMPLES > 1
@@ -50,22 +49,8 @@ void tangent_frame(vec3 normal, out vec3 tangent, out vec3 bitangent) {
     tangent = normalize(v_tangent.xyz);
     bitangent = cross(normal, tangent) * v_tangent.w;
 #else
-    // From the derivatives of position and texture coordinates (Schueler 2013).
     vec2 uv = UV_SET(NORMAL_UV);
-    vec3 position_dx = dFdx(v_position), position_dy = dFdy(v_position);
-    vec2 uv_dx = dFdx(uv), uv_dy = dFdy(uv);
-    vec3 perpendicular_dx = cross(position_dy, normal), perpendicular_dy = cross(normal, position_dx);
-    tangent = perpendicular_dx * uv_dx.x + perpendicular_dy * uv_dy.x;
-    bitangent = -(perpendicular_dx * uv_dx.y + perpendicular_dy * uv_dy.y);
-    float longest = max(dot(tangent, tangent), dot(bitangent, bitangent));
-    float shortest = min(dot(tangent, tangent), dot(bitangent, bitangent));
-    if (shortest < max(1e-30, 1e-12 * longest)) {  // no usable texture coordinates: any frame will do
-        tangent = any_tangent(normal);
-        bitangent = cross(normal, tangent);
-    } else {
-        tangent *= inversesqrt(longest);
-        bitangent *= inversesqrt(longest);
-    }
+    uv_tangent_frame(normal, dFdx(v_position), dFdy(v_position), dFdx(uv), dFdy(uv), tangent, bitangent);
 #endif
 }
 #endif
@@ -88,68 +73,47 @@ Surface fragment_surface(View view) {
     s.base_color = base.rgb;
     s.alpha = base.a;
 
-    s.metallic = m.surface.x;
-    s.roughness = m.surface.y;
+    MaterialTexels texels = no_texels();
 #ifdef HAS_METALLIC_ROUGHNESS_TEXTURE
     vec2 uv = slot_uv(v_material, METALLIC_ROUGHNESS_SLOT, UV_SET(METALLIC_ROUGHNESS_UV));
-    vec3 texel = texture(metallic_roughness_texture, uv).rgb;
-    s.metallic *= texel.b;
-    s.roughness *= texel.g;
+    texels.metallic_roughness = texture(metallic_roughness_texture, uv).rgb;
+    texels.has_metallic_roughness = true;
 #endif
-
-    vec4 specular = m.specular;
 #ifdef HAS_SPECULAR_TEXTURE
-    specular.a *= texture(specular_texture, slot_uv(v_material, SPECULAR_SLOT, UV_SET(SPECULAR_UV))).a;
+    texels.specular.a = texture(specular_texture, slot_uv(v_material, SPECULAR_SLOT, UV_SET(SPECULAR_UV))).a;
 #endif
 #ifdef HAS_SPECULAR_COLOR_TEXTURE
-    specular.rgb *=
+    texels.specular.rgb =
         texture(specular_color_texture, slot_uv(v_material, SPECULAR_COLOR_SLOT, UV_SET(SPECULAR_COLOR_UV))).rgb;
 #endif
-
     s.normal = normalize(v_normal);
 #ifdef NEEDS_TANGENT
     tangent_frame(s.normal, s.tangent, s.bitangent);
 #endif
 #ifdef HAS_NORMAL_TEXTURE
-    vec2 normal_uv = slot_uv(v_material, NORMAL_SLOT, UV_SET(NORMAL_UV));
-    vec3 tangent_normal = texture(normal_texture, normal_uv).xyz * 2.0 - 1.0;
-    tangent_normal.xy *= m.surface.w;
-    s.normal = normalize(mat3(s.tangent, s.bitangent, s.normal) * tangent_normal);
+    texels.normal = texture(normal_texture, slot_uv(v_material, NORMAL_SLOT, UV_SET(NORMAL_UV))).xyz;
+    texels.has_normal = true;
 #endif
-#ifdef NEEDS_GRAIN
-    s.anisotropy = m.extra.y;
-    vec2 grain = vec2(cos(m.extra.z), sin(m.extra.z));  // direction in the tangent plane
-#ifdef HAS_ANISOTROPY_TEXTURE
+#if defined(HAS_ANISOTROPY_TEXTURE) && defined(NEEDS_GRAIN)
     vec2 anisotropy_uv = slot_uv(v_material, ANISOTROPY_SLOT, UV_SET(ANISOTROPY_UV));
-    vec3 anisotropy = texture(anisotropy_texture, anisotropy_uv).rgb;
-    grain = mat2(grain.x, grain.y, -grain.y, grain.x) * (anisotropy.rg * 2.0 - 1.0);
-    s.anisotropy *= anisotropy.b;
+    texels.anisotropy = texture(anisotropy_texture, anisotropy_uv).rgb;
+    texels.has_anisotropy = true;
 #endif
-    s.tangent = normalize(s.tangent) * grain.x + normalize(s.bitangent) * grain.y;
-    s.tangent = normalize(s.tangent - s.normal * dot(s.normal, s.tangent));
-    s.bitangent = cross(s.normal, s.tangent);
-#endif
-#ifdef DOUBLE_SIDED
-    if (!gl_FrontFacing) s.normal = -s.normal;
-#endif
-
-    s.lit = 1.0;
-#ifdef UNLIT
-    s.lit = 0.0;
-#endif
-    s.occlusion = 1.0;
 #ifdef HAS_OCCLUSION_TEXTURE
-    float occlusion = texture(occlusion_texture, slot_uv(v_material, OCCLUSION_SLOT, UV_SET(OCCLUSION_UV))).r;
-    s.occlusion += m.surface.z * (occlusion - 1.0);
-#endif
-    s.emissive = m.emissive.rgb;
-#ifdef NO_EMISSIVE  // no material of the scene is emissive
-    s.emissive = vec3(0.0);
+    texels.occlusion = texture(occlusion_texture, slot_uv(v_material, OCCLUSION_SLOT, UV_SET(OCCLUSION_UV))).r;
+    texels.has_occlusion = true;
 #endif
 #ifdef HAS_EMISSIVE_TEXTURE
-    s.emissive *= texture(emissive_texture, slot_uv(v_material, EMISSIVE_SLOT, UV_SET(EMISSIVE_UV))).rgb;
+    texels.emissive = texture(emissive_texture, slot_uv(v_material, EMISSIVE_SLOT, UV_SET(EMISSIVE_UV))).rgb;
 #endif
-    derive_reflectance(s, m, specular);
+    bool flip_normal = false, lit = true;
+#ifdef DOUBLE_SIDED
+    flip_normal = !gl_FrontFacing;
+#endif
+#ifdef UNLIT
+    lit = false;
+#endif
+    material_surface(s, m, texels, flip_normal, lit);
 #ifdef ALPHA_MASK
     alpha_test(s.alpha, m.emissive.a);
 #endif

@@ -1,6 +1,7 @@
 // The surface point that shading models read, from geometry or from a G-buffer. NEEDS_PHONG and NEEDS_GRAIN follow from
 // the model's `#pragma needs`. With NEEDS_GRAIN_WHERE_ANY, NEEDS_GRAIN is defined only for anisotropic materials.
-#if defined(NEEDS_GRAIN_WHERE_ANY) && (defined(ANISOTROPIC) || defined(HAS_GRAIN)) && !defined(NEEDS_GRAIN)
+#if defined(NEEDS_GRAIN_WHERE_ANY) && !defined(NEEDS_GRAIN) && \
+    (defined(ANISOTROPIC) || defined(HAS_GRAIN) || defined(SCENE_GRAIN))
 #define NEEDS_GRAIN
 #endif
 #ifdef MATERIAL_COUNT
@@ -53,26 +54,39 @@ vec4 dielectric_of(MaterialData m, vec4 specular) {
 #endif
 }
 
+#ifdef HAS_METALLIC_ROUGHNESS_TEXTURE
+const bool BATCH_HAS_METALLIC_ROUGHNESS = true;
+#else
+const bool BATCH_HAS_METALLIC_ROUGHNESS = false;
+#endif
+
 // Coefficients of the empirical models: the material's own kd, ks and ka. With a metallic-roughness texture they follow
 // from the physical ones instead: kd = base colour × (1 - metallic), ks = f0.
-void empirical_reflectance(inout Surface s, MaterialData m) {
+void empirical_reflectance(inout Surface s, MaterialData m, bool has_metallic_roughness) {
     s.exponent = phong_exponent(s.roughness);
-#ifndef HAS_METALLIC_ROUGHNESS_TEXTURE
+    if (has_metallic_roughness) return;
     // The base colour texture multiplies kd and ka, and changes the metallic part of ks.
     vec3 base_color_texel = s.base_color / max(m.base_color.rgb, 1e-6);
     s.diffuse = m.phong_diffuse.rgb * base_color_texel;
     s.f0 = m.phong_specular.rgb + (s.base_color - m.base_color.rgb) * s.metallic;
     s.ambient = m.phong_ambient.rgb * base_color_texel;
     s.exponent = m.phong_diffuse.w;
-#endif
+}
+
+void empirical_reflectance(inout Surface s, MaterialData m) {
+    empirical_reflectance(s, m, BATCH_HAS_METALLIC_ROUGHNESS);
 }
 
 // Derives the reflectance that the shading model of this program reads.
-void derive_reflectance(inout Surface s, MaterialData m, vec4 specular) {
+void derive_reflectance(inout Surface s, MaterialData m, vec4 specular, bool has_metallic_roughness) {
     s.dielectric = dielectric_of(m, specular);
     physical_reflectance(s, s.dielectric);
 #ifdef NEEDS_PHONG
-    empirical_reflectance(s, m);
+    empirical_reflectance(s, m, has_metallic_roughness);
 #endif
+}
+
+void derive_reflectance(inout Surface s, MaterialData m, vec4 specular) {
+    derive_reflectance(s, m, specular, BATCH_HAS_METALLIC_ROUGHNESS);
 }
 #endif

@@ -41,7 +41,7 @@ def test_only_records_of_what_has_moved_are_written(gl: Any, monkeypatch: pytest
     monkeypatch.setattr(gpu_scene, "write_records", count)
     with gl.device.current():
         made = GpuScene(gl.device, scene, pack.pack(scene), None, None)  # type: ignore[arg-type]  # it has no images
-        before = made._previous()
+        before = made.previous()
         for moving in (0, 1, 2, 80, 1, 0, 0, 3):  # 80 of 100 are too many runs to be written one by one
             was = made.packed.instances.tobytes()
             made.advance()

@@ -1,0 +1,22 @@
+// Where the objects were in the frame before, for steps that read an input of `SceneData`.
+#include <scene.glsl>
+
+layout(std430) readonly buffer scene_previous_block {
+    float scene_previous[];  // 14 for each instance: the three rows of its matrix, and two that are not used
+};
+
+// World-space position in the frame before of a point of a triangle.
+vec3 scene_previous_position(int instance, int triangle, vec2 barycentrics) {
+    ivec3 v = scene_triangle(instance, triangle);
+    vec3 w = scene_weights(barycentrics);
+    mat3 corners =
+        mat3(scene_vertex_position(v.x), scene_vertex_position(v.y), scene_vertex_position(v.z));
+    vec4 point = vec4(corners * w, 1.0);
+    vec3 previous;
+    for (int row = 0; row < 3; ++row) {
+        int at = 14 * instance + 4 * row;
+        previous[row] = dot(
+            vec4(scene_previous[at], scene_previous[at + 1], scene_previous[at + 2], scene_previous[at + 3]), point);
+    }
+    return previous;
+}
