@@ -28,7 +28,7 @@ def layers_of(nodes: Sequence[str], links: Sequence[Link]) -> dict[str, int]:
     """Return the column of every node: as early as possible, but nodes without inputs are beside their first reader."""
     import networkx as nx  # takes longer than checking a pipeline
 
-    links = [link for link in links if not link.previous]
+    links = [link for link in links if not (link.previous or link.back)]
     dag: nx.DiGraph[str] = nx.DiGraph()
     dag.add_nodes_from(nodes)
     dag.add_edges_from((link.source, link.target) for link in links)

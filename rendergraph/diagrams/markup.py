@@ -38,13 +38,14 @@ class Card(Struct, frozen=True):
 
 
 class Link(Struct, frozen=True):
-    """From an output to an input; `previous` carries last frame's value."""
+    """From an output to an input; `previous` carries last frame's value, and `back` closes a cycle of nodes."""
 
     source: str
     source_port: str
     target: str
     target_port: str
     previous: bool = False
+    back: bool = False
 
 
 def format_texture(desc: TextureDesc) -> str:
@@ -96,8 +97,9 @@ def cards(graph: Graph) -> list[Card]:
 
 
 def links(graph: Graph) -> list[Link]:
+    place = {id: at for at, id in enumerate(graph.reading_order())} if graph.cyclic else {}
     return [
-        Link(end.node, end.port, node.id, port, end.previous)
+        Link(end.node, end.port, node.id, port, end.previous, bool(place and place[end.node] >= place[node.id]))
         for node in graph.nodes
         for port, ends in node.inputs.items()
         for end in ends
@@ -235,7 +237,9 @@ def graph_json(graph: Graph) -> dict[str, Any]:
         "name": graph.name,
         "size": list(graph.size),
         "nodes": [_node_json(graph, card) for card in cards(graph)],
-        "links": to_builtins(links(graph)),
+        "links": [
+            {name: value for name, value in each.items() if name != "back"} for each in to_builtins(links(graph))
+        ],
         "outputs": {name: str(end) for name, end in graph.outputs.items()},
     }
 

@@ -111,7 +111,7 @@ class _Picture:
         """Give the links of every output their lanes, and tie boxes and lanes together."""
         by_port: dict[tuple[str, str], list[Link]] = {}
         for link in self.links:
-            if not link.previous:
+            if not (link.previous or link.back):
                 by_port.setdefault((link.source, link.source_port), []).append(link)
         trunks = []
         for (source, port), members in by_port.items():
@@ -132,7 +132,7 @@ class _Picture:
         return trunks
 
     def draw(self) -> str:
-        returns = [link for link in self.links if link.previous]
+        returns = [link for link in self.links if link.previous or link.back]
         width = (self.lefts[-1] + self.widths[-1] if self.widths else 0.0) + MARGIN
         height = self.bottom + 2 * MARGIN + (14 * len(returns) + 10 if returns else 0)
         parts = [
@@ -181,7 +181,7 @@ class _Picture:
             yield self._link(link, _bend(start, self._target(link), begin=True))
 
     def _return(self, link: Link, lane: float) -> str:
-        """Last frame's value: out to the right, back beneath everything, in from the left."""
+        """Last frame's value, or what closes a cycle: out to the right, back beneath everything, in from the left."""
         (x, y), (end_x, end_y) = self._source(link), self._target(link)
         out, back = x + COLUMN_GAP * 0.4, end_x - COLUMN_GAP * 0.4
         return self._link(

@@ -56,7 +56,7 @@ def _finalize(graph: Graph, found: VersionedSteps, outputs: Mapping[str, Endpoin
             steps.append(_copy(name, end, resource, version, steps))
     _mark_roles(graph, found, shown, steps, resources)
     ports = {end: resource for end, (resource, _) in found.final.items()}
-    return Expansion(tuple(steps), resources, shown, found.idle, found.views, ports)
+    return Expansion(tuple(steps), resources, shown, found.idle, found.views, ports, graph.overwritten)
 
 
 def _copy(name: str, end: Endpoint, resource: str, version: int, steps: list[Step]) -> Step:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from msgspec import Struct, field
 
+from rendergraph.errors import Problem
 from rendergraph.link import Endpoint
 from rendergraph.link.infer import CAMERA as CAMERA
 from rendergraph.steps import Resource, Step
@@ -52,6 +53,7 @@ class Expansion(Struct, frozen=True):
     Attributes:
         outputs: output name or tap to the id of the resource that must exist at the end of the frame.
         ports: port to the id of the resource that holds its texture or buffer.
+        overwritten: as in `Graph`.
     """
 
     steps: tuple[Step, ...]
@@ -60,6 +62,7 @@ class Expansion(Struct, frozen=True):
     idle: Mapping[str, str] = field(default_factory=dict)
     views: Mapping[str, ViewTable] = field(default_factory=dict)
     ports: Mapping[Endpoint, str] = field(default_factory=dict)
+    overwritten: Mapping[tuple[str, str], Problem] = field(default_factory=dict)
 
 
 def follow_forwards(forwarded: Mapping[Endpoint, Endpoint], end: Endpoint) -> Endpoint:

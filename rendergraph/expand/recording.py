@@ -133,7 +133,7 @@ class Recording:
         ports = self.node.node.ports()
         names: set[str] = set()
         for request in self.requests:
-            for target in request.bindings.values():
+            for target in request.reads:
                 port = target.port if isinstance(target, Part) else target
                 names.add(port.name)
                 if isinstance(port, Function):
@@ -163,7 +163,7 @@ def record_all(
     """Record every node that an output needs; return recordings in order, and idle nodes with their reasons."""
     history_readers = _history_readers(graph, outputs)
     while True:
-        recordings, idle = _record(graph, order, outputs, history_readers)
+        recordings, idle = _record(graph, order, outputs, history_readers, {})
         if not history_readers & idle.keys():
             return recordings, idle
         history_readers -= idle.keys()  # whoever does nothing does not read last frame's values either
@@ -183,10 +183,18 @@ def _history_readers(graph: Graph, outputs: Mapping[str, Endpoint]) -> set[str]:
 
 
 def _record(
-    graph: Graph, order: list[str], outputs: Mapping[str, Endpoint], history_readers: set[str]
+    graph: Graph,
+    order: list[str],
+    outputs: Mapping[str, Endpoint],
+    history_readers: set[str],
+    demanded_before: Mapping[str, set[str]],
 ) -> tuple[dict[str, Recording], dict[str, str]]:
-    """`history_readers` may come earlier in the order than the nodes whose last values they read."""
-    demanded: dict[str, set[str]] = {name: set() for name in order}
+    """`history_readers` may come earlier in the order than the nodes whose last values they read.
+
+    Where nodes form a cycle one may be recorded before all of its readers are: `demanded_before` tells what they read.
+    """
+    demanded: dict[str, set[str]] = {name: set(demanded_before.get(name, ())) for name in order}
+    told: dict[str, int] = {}
     for end in outputs.values():
         demanded[end.node].add(end.port)
     for name in history_readers:
@@ -200,6 +208,7 @@ def _record(
     for name in reversed(order):
         node = graph[name]
         used = demanded[name]
+        told[name] = len(used)
         if not used:
             idle[name] = _why_unread(graph, node, reached)
             continue
@@ -231,6 +240,8 @@ def _record(
         recordings[name] = recording
         for end in recording.demands():
             demanded[end.node].add(end.port)
+    if graph.cyclic and any(len(demanded[name]) > count for name, count in told.items()):
+        return _record(graph, order, outputs, history_readers, demanded)
     return {name: recordings[name] for name in order if name in recordings}, idle
 
 

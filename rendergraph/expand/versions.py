@@ -50,26 +50,56 @@ class _VersionAssignment:
         self.firsts: dict[str, float] = {}
 
     def run(self) -> VersionedSteps:
-        for recording in self.recordings.values():
-            self._node(recording)
+        if self.graph.cyclic:
+            self._by_step()
+        else:
+            for recording in self.recordings.values():
+                self._node(recording)
         return VersionedSteps(
             self.steps, self.resources, self.version, self.final, self.forwarded, self.firsts, self.idle, self.views
         )
 
     def _node(self, recording: Recording) -> None:
         self._declare(recording)
-        before = len(self.steps)
-        for request in recording.requests:
-            self.steps.append(self._step(recording, request, len(self.steps) - before))
-        if len(self.steps) == before and not any(
-            isinstance(port, Function | Views) and port.name in recording.used_ports
-            for port in recording.node.node.outputs().values()
-        ):
-            self.idle[recording.node.id] = "it recorded no step"
+        for number, request in enumerate(recording.requests):
+            self.steps.append(self._step(recording, request, number))
+        self._note_idle(recording)
         for end in recording.own.values():
             if end in self.final:
                 resource, _ = self.final[end]
                 self.final[end] = resource, self.version[resource]
+
+    def _note_idle(self, recording: Recording) -> None:
+        if not recording.requests and not any(
+            isinstance(port, Function | Views) and port.name in recording.used_ports
+            for port in recording.node.node.outputs().values()
+        ):
+            self.idle[recording.node.id] = "it recorded no step"
+
+    def _by_step(self) -> None:
+        """The same where nodes form a cycle: the steps of one stand before and behind those of others."""
+        from rendergraph.expand.order import step_order  # few pipelines have one
+
+        for recording in self.recordings.values():
+            self._declare(recording)
+        for name, number in step_order(self.graph, self.recordings, self.forwarded):
+            recording = self.recordings[name]
+            self.steps.append(self._step(recording, recording.requests[number], number))
+        for recording in self.recordings.values():
+            self._note_idle(recording)
+            for end in recording.own.values():
+                self._final(end)
+
+    def _final(self, end: Endpoint) -> tuple[str, int] | None:
+        """Return the resource of a port and the version that it has by now."""
+        found = self.final.get(end)
+        if found is None and self.graph.cyclic and end.node in self.recordings:
+            links = self.recordings[end.node].links.get(end.port)
+            if links and end in self.recordings[end.node].own.values():
+                found = self._final(follow_forwards(self.forwarded, links[0]))
+                if found is not None:
+                    self.final[end] = found
+        return found
 
     def _declare(self, recording: Recording) -> None:
         """Create a resource for every texture the node may write; an `InOut` continues an existing one."""
@@ -84,6 +114,8 @@ class _VersionAssignment:
                 continue
             if isinstance(made, InOut) and recording.links.get(name):
                 before = follow_forwards(self.forwarded, recording.links[name][0])
+                if self.graph.cyclic:
+                    continue  # until a step needs it: what it continues is not written yet
                 if before in self.final:  # else nothing that runs touches it, here or where it comes from
                     self.final[end] = self.final[before]
                 continue
@@ -181,13 +213,14 @@ class _VersionAssignment:
                 if part.link in (None, number)
             ]
         own = Endpoint(recording.node.id, port.name, part.previous)
-        resource, _ = self.final[own.now]
-        return [self._read(name, own, part, part.sampler or _PLAIN, part.use or "sample", self.version[resource])]
+        found = self._final(own.now)
+        assert found is not None  # its node declares it
+        return [self._read(name, own, part, part.sampler or _PLAIN, part.use or "sample", found[1])]
 
     def _read(
         self, name: str, end: Endpoint, part: Part, sampler: Sampler, use: Use, version: int | None = None
     ) -> Read:
-        resource, final = self.final.get(follow_forwards(self.forwarded, end)) or (str(self._maker(end)), 0)
+        resource, final = self._final(follow_forwards(self.forwarded, end)) or (str(self._maker(end)), 0)
         port = self.graph[end.node].node.ports()[end.port] if end.previous else None
         if isinstance(port, InOut) and port.first is not None:
             self.firsts[resource] = port.first  # said where the texture is continued, and read from there
@@ -206,12 +239,14 @@ class _VersionAssignment:
         port = part.port
         assert isinstance(port, WrittenPort)  # `steps` has seen to that
         end = recording.own[port.name]
-        if end not in self.final:
+        found = self._final(end)
+        if found is None:
             raise self._refused(recording, request, "RG421", f"it writes '{port.name}', which has no layers")
-        resource, _ = self.final[end]
+        resource, _ = found
         desc = self.resources[resource].desc
         old = self.version[resource]
         self.version[resource] = old + 1
+        self.final[end] = resource, old + 1
         continued = isinstance(port, InOut) and bool(recording.links.get(port.name))
         parts, touched = self.written[resource], parts_written(request, part, desc)
         fresh = not continued and not any(overlap(one, other) for one in parts for other in touched)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from msgspec import Struct
 
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import Facts, LightFacts, TextureInfo
+from rendergraph.document import Value
 from rendergraph.errors import InputError, Option, Problem, suggestion
 from rendergraph.facts import ObjectFacts, SceneDataFacts
 from rendergraph.keys import MOST_PROBLEMS
@@ -26,7 +27,7 @@ from rendergraph.link.nodes import (
     missing_source,
     remove_disabled,
 )
-from rendergraph.link.order import cycles, needs, sources, versions
+from rendergraph.link.order import Ancestors, cycles, needs, sources, versions
 from rendergraph.resolve import NodeSpec, PipelineSpec
 from rendergraph.textures import SEMANTICS, TEXTURE_KINDS, Radiance, TextureDesc
 
@@ -171,16 +172,20 @@ class _Linker(Struct, eq=False):
         )
         infer = TextureInference(nodes, facts, used)
         textures: dict[Endpoint, TextureInfo] = {}
+        overwritten: Mapping[tuple[str, str], Problem] = {}
+        if len(order) < len(nodes):
+            infer.before = Ancestors(nodes)
         if cyclic:
             self.problems += cyclic
             if self.sketching:
                 textures = self._textures(list(nodes), nodes, infer)
                 self.checked = Checker(nodes, textures, infer, self.catalog)
         else:
-            self.problems += needs(nodes, outputs, written) + versions(nodes)
+            found, overwritten = versions(nodes)
+            self.problems += needs(nodes, outputs, written) + found
             self._check_subgraph_inputs(nodes, infer)
             self._warn_of_unused_settings(nodes)
-            textures = self._textures(order, nodes, infer)
+            textures = self._textures(dict.fromkeys([*order, *nodes]), nodes, infer)
             self.checked = Checker(nodes, textures, infer, self.catalog)
             self.problems += self.checked.check()
             self._check_outputs(nodes, outputs, infer)
@@ -202,6 +207,8 @@ class _Linker(Struct, eq=False):
             environment=self.environment,
             scene_data=facts.scene_data,
             unlit=tuple(name for name, draft in written.items() if draft.unlit),
+            overwritten=overwritten,
+            cyclic=_links(nodes) if len(order) < len(nodes) else {},
             warnings=(*dict.fromkeys(warning for one in types.values() for warning in one.warnings), *self.warnings),
         )
 
@@ -264,7 +271,7 @@ class _Linker(Struct, eq=False):
         return found
 
     def _textures(
-        self, order: list[str], nodes: Mapping[str, UnlinkedNode], infer: TextureInference
+        self, order: Iterable[str], nodes: Mapping[str, UnlinkedNode], infer: TextureInference
     ) -> dict[Endpoint, TextureInfo]:
         """In this order a rule rarely has to look further up."""
         textures: dict[Endpoint, TextureInfo] = {}
@@ -356,6 +363,15 @@ def _member(draft: UnlinkedNode, infer: TextureInference) -> GraphNode:
     }
     clears = {name: infer.clear(draft, port) for name, port in draft.type.written.items()}
     return GraphNode(spec.id, draft.type, draft.node, links, spec.place, draft.choices, samplers, clears)
+
+
+def _links(nodes: Mapping[str, UnlinkedNode]) -> dict[tuple[str, str, Endpoint], Value]:
+    return {
+        (draft.spec.id, name, link.source): link.value
+        for draft in nodes.values()
+        for name, links in draft.links.items()
+        for link in links
+    }
 
 
 def _in_order(problems: Sequence[Problem]) -> list[Problem]:

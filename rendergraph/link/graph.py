@@ -1,8 +1,8 @@
-"""What linking makes: a DAG of typed nodes and edges."""
+"""What linking makes: a graph of typed nodes and edges."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from functools import cached_property
 from heapq import heappop, heappush
 from pathlib import Path
@@ -12,6 +12,7 @@ from msgspec import Struct, field
 
 from rendergraph.catalog import NodeType
 from rendergraph.declare import Facts, LightFacts, Node, Texel, TextureInfo
+from rendergraph.document import Value
 from rendergraph.errors import Place, Problem
 from rendergraph.facts import SELECTIONS, ObjectFacts, SceneDataFacts
 from rendergraph.textures import Sampler, TextureDesc
@@ -67,6 +68,8 @@ class Graph(Struct, frozen=True, dict=True):
         environment: read by inputs of an environment that have no link.
         scene_data: likewise, of the scene's data; None if no node has such an input.
         unlit: nodes that need an environment where the scene has none; they are not members either.
+        overwritten: what is wrong if a reader, the first of two nodes, cannot run between the steps of the second.
+        cyclic: where nodes form a cycle, though their steps need not: each link by its reader, input and source.
     """
 
     name: str
@@ -82,6 +85,8 @@ class Graph(Struct, frozen=True, dict=True):
     environment: TextureDesc | None = None
     scene_data: SceneDataFacts | None = None
     unlit: tuple[str, ...] = ()
+    overwritten: Mapping[tuple[str, str], Problem] = field(default_factory=dict)
+    cyclic: Mapping[tuple[str, str, Endpoint], Value] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         width, height = self.size
@@ -137,14 +142,32 @@ class Graph(Struct, frozen=True, dict=True):
         return dag
 
     def reading_order(self) -> list[str]:
-        """Return node ids behind what they read in this frame; nodes of a cycle, which only a sketch has, come last."""
-        order = upstream_first(
-            {
-                name: {end.node for ends in node.inputs.values() for end in ends if not end.previous}
-                for name, node in self.members.items()
-            }
-        )
-        return order if len(order) == len(self.members) else [*dict.fromkeys([*order, *self.members])]
+        """Return node ids behind what they read in this frame, as far as they form no cycle."""
+        sources = {
+            name: {end.node: None for ends in node.inputs.values() for end in ends if not end.previous}
+            for name, node in self.members.items()
+        }
+        order = upstream_first(sources)
+        return order if len(order) == len(self.members) else _depth_first(sources)
+
+
+def _depth_first(sources: Mapping[T, Iterable[T]]) -> list[T]:
+    """Sort names behind their sources, but for the links that close a cycle."""
+    order: dict[T, None] = {}
+    begun: set[T] = set()
+    for name in sources:
+        stack = [(name, iter(sources[name]))] if name not in begun else []
+        begun.add(name)
+        while stack:
+            at, left = stack[-1]
+            source = next((one for one in left if one not in begun), None)
+            if source is None:
+                order[at] = None
+                stack.pop()
+            else:
+                begun.add(source)
+                stack.append((source, iter(sources[source])))
+    return list(order)
 
 
 def upstream_first(sources: Mapping[T, Collection[T]]) -> list[T]:

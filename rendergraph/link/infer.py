@@ -81,6 +81,7 @@ class TextureInference:
         self.used = {end.now for end in used}
         self.problems: list[Problem] = []
         self.infos: dict[Endpoint, TextureInfo | None] = {}
+        self.before: Mapping[str, set[str]] | None = None  # where nodes form a cycle, all that each of them needs
         self._open: set[Endpoint] = set()
         self._facts: dict[str, Facts] = {}
         self._answers: dict[tuple[str, int], Any] = {}
@@ -91,7 +92,7 @@ class TextureInference:
         end = end.now
         if end not in self.infos:
             if end in self._open:
-                self._report(end, "RG213", "its size or format depends on itself through '@previous'")
+                self._report(end, "RG213", "its size or format depends on itself through a cycle of links")
                 return None
             self._open.add(end)
             try:
@@ -305,6 +306,8 @@ class TextureInference:
             if isinstance(port, Input) and port.kind != "view" and port.size == "any":
                 continue
             for link in links:
+                if self.before is not None and draft.spec.id in self.before[link.source.node]:
+                    continue  # which may be sized like what is asked for
                 info = self.info(link.source) if not link.source.previous else None
                 if info is None or info.view is None or info.view == CAMERA:
                     continue

@@ -3,42 +3,53 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 from msgspec.structs import replace
 
-from rendergraph.declare import InOut
+from rendergraph.declare import InOut, Node, WrittenPort
 from rendergraph.errors import Problem
 from rendergraph.link.graph import Endpoint
 from rendergraph.link.nodes import Link, UnlinkedNode, line_of, missing_source
 
 
 def cycles(nodes: Mapping[str, UnlinkedNode]) -> list[Problem]:
+    """Report the cycles that are certain whichever steps the nodes record; `expand` finds the others (RG117).
+
+    An output certainly waits for every input of a node without `record`, and for the input that it continues or is
+    `like`.
+    """
     import networkx as nx  # for the message of a mistake alone
 
-    links = {
-        (link.source.node, draft.spec.id): (name, link)
-        for draft in nodes.values()
-        for name, ends in draft.links.items()
-        for link in ends
-        if not link.source.previous
-    }
-    graph: nx.DiGraph[str] = nx.DiGraph()
-    graph.add_nodes_from(nodes)
+    links: dict[tuple[Endpoint, Endpoint], tuple[str, Link]] = {}
+    for draft in nodes.values():
+        for port in draft.type.cls.outputs().values():
+            like = port.like if isinstance(port, WrittenPort) else None
+            waits = draft.links if draft.type.cls.record is Node.record else {port.name, like}
+            for name, ends in draft.links.items():
+                for link in ends if name in waits else ():
+                    if not link.source.previous:
+                        links[link.source, Endpoint(draft.spec.id, port.name)] = name, link
+    graph: nx.DiGraph[Any] = nx.DiGraph()
     graph.add_edges_from(links)
     rank = {name: number for number, name in enumerate(nodes)}
+
+    def place(end: Endpoint) -> tuple[int, str]:
+        return rank[end.node], end.port
+
     found = []
     for component in nx.strongly_connected_components(graph):
-        first = min(component, key=rank.__getitem__)
+        first = min(component, key=place)
         if len(component) == 1 and not graph.has_edge(first, first):
             continue
-        path = [a for a, _ in nx.find_cycle(graph.subgraph(sorted(component, key=rank.__getitem__)), first)]
+        path = [a for a, _ in nx.find_cycle(graph.subgraph(sorted(component, key=place)), first)]
         steps = [(path[number], path[(number + 1) % len(path)]) for number in range(len(path))]
-        ends = [str(links[step][1].source) for step in steps]
+        names = [str(end) for end in path]
         value = links[steps[-1]][1].value
-        if len(ends) > 8:
-            ends[3:-3] = [f"{len(ends) - 6} more"]
+        if len(names) > 8:
+            names[3:-3] = [f"{len(names) - 6} more"]
         text = (
-            f"the nodes form a cycle, {' → '.join([*ends, ends[0]])}; '@previous' behind one reads last frame's value"
+            f"the nodes form a cycle, {' → '.join([*names, names[0]])}; '@previous' behind one reads last frame's value"
         )
         found.append(value.problem("RG117", text))
     return found
@@ -71,8 +82,12 @@ def needs(
     return problems
 
 
-def versions(nodes: Mapping[str, UnlinkedNode]) -> list[Problem]:
-    """Check that each version has one writer (`InOut`), after all its readers; outputs keep their version."""
+def versions(nodes: Mapping[str, UnlinkedNode]) -> tuple[list[Problem], dict[tuple[str, str], Problem]]:
+    """Check that each version has one writer (`InOut`), after all its readers; outputs keep their version.
+
+    Returns:
+        What is wrong, and what is by reader and writer if the steps of that writer cannot run around the reader.
+    """
     writers: dict[Endpoint, tuple[UnlinkedNode, Link]] = {}
     problems: list[Problem] = []
     for draft in nodes.values():
@@ -90,18 +105,19 @@ def versions(nodes: Mapping[str, UnlinkedNode]) -> list[Problem]:
                     problems.append(link.value.problem("RG126", text))
                 else:
                     writers[link.source] = draft, link
-    if writers and not problems:
-        problems += _readers(nodes, writers)
-    return problems
+    return _readers(nodes, writers) if writers and not problems else (problems, {})
 
 
 def _port(draft: UnlinkedNode, link: Link) -> str:
     return next(name for name, links in draft.links.items() if link in links)
 
 
-def _readers(nodes: Mapping[str, UnlinkedNode], writers: Mapping[Endpoint, tuple[UnlinkedNode, Link]]) -> list[Problem]:
+def _readers(
+    nodes: Mapping[str, UnlinkedNode], writers: Mapping[Endpoint, tuple[UnlinkedNode, Link]]
+) -> tuple[list[Problem], dict[tuple[str, str], Problem]]:
     problems = []
-    before = _Ancestors(nodes)
+    suspects: dict[tuple[str, str], Problem] = {}
+    before = Ancestors(nodes)
     for draft in nodes.values():
         for name, links in draft.links.items():
             for link in links:
@@ -118,11 +134,15 @@ def _readers(nodes: Mapping[str, UnlinkedNode], writers: Mapping[Endpoint, tuple
                     problems.append(link.value.problem("RG127", text))
                 elif writer.spec.id in before[draft.spec.id]:
                     text = f"'{draft.spec.id}.{name}' reads '{now}', but '{draft.spec.id}' also needs {newer} ({where})"
-                    problems.append(link.value.problem("RG128", f"{text}, which overwrites it; read {newer}"))
-    return problems
+                    problem = link.value.problem("RG128", f"{text}, which overwrites it; read {newer}")
+                    if writer.type.cls.record is Node.record:
+                        problems.append(problem)
+                    else:
+                        suspects[draft.spec.id, writer.spec.id] = problem
+    return problems, suspects
 
 
-class _Ancestors(dict[str, set[str]]):
+class Ancestors(dict[str, set[str]]):
     """All nodes that a node needs in the same frame, computed on demand."""
 
     def __init__(self, nodes: Mapping[str, UnlinkedNode]) -> None:

@@ -114,7 +114,7 @@ def schedule(
     shown = set(expansion.outputs.values())
     resources = {id: expansion.resources[id] for id in sorted(expansion.resources) if id in touched or id in shown}
     kept_versions = Versions.of(kept) if len(kept) < len(expansion.steps) else versions
-    waits = dependencies(kept, kept_versions)
+    waits = dependencies(kept, kept_versions, expansion.overwritten)
     sinks = _sinks(expansion, kept, versions)
     whole_frame = frozenset(alive_all_frame(resources, kept_versions))
     problem = _SchedulingProblem(kept, waits, resources, shown, whole_frame, sinks)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations, pairwise
 from typing import TypeAlias
 
@@ -139,12 +139,15 @@ def contributing(
     return [step for step in steps if step.key in kept]
 
 
-def dependencies(kept: Sequence[Step], versions: Versions) -> Waits:
+def dependencies(
+    kept: Sequence[Step], versions: Versions, overwritten: Mapping[tuple[str, str], Problem] = {}
+) -> Waits:
     """Return the steps that each needed step waits for.
 
     A reader follows the writer of its version; a writer follows the writer before it and all readers of what it
     overwrites. A step's dependencies are in the order of its reads, then its writes, not in that of nodes.
-    `versions` are those of the needed steps alone. Steps that wait for each other are an error (RG602).
+    `versions` are those of the needed steps alone. Steps that wait for each other are an error: that in `overwritten`
+    of the nodes that read and overwrite a texture, else RG602.
     """
     # Readers by the kept version they see: the writers between may have been culled.
     readers: dict[tuple[str, int], list[StepKey]] = defaultdict(list)
@@ -168,13 +171,33 @@ def dependencies(kept: Sequence[Step], versions: Versions) -> Waits:
                 mine.setdefault(reader, (write.resource, "overwrites"))
         mine.pop(step.key, None)
     if len(upstream_first(waits)) < len(waits):
-        from graphlib import CycleError, TopologicalSorter  # to name a cycle where there is one
-
-        try:
-            TopologicalSorter(waits).prepare()  # names one cycle
-        except CycleError as error:
-            raise InputError(_cycle(waits, list(pairwise(error.args[1])))) from None
+        raise InputError(list(dict.fromkeys(_cycles(waits, overwritten))))
     return waits
+
+
+def _cycles(
+    waits: dict[StepKey, dict[StepKey, tuple[str, str]]], overwritten: Mapping[tuple[str, str], Problem]
+) -> Iterator[Problem]:
+    """Yield the problem of a cycle, then of those that are left without what that one is about."""
+    from graphlib import CycleError, TopologicalSorter  # to name a cycle where there is one
+
+    while True:
+        try:
+            TopologicalSorter(waits).prepare()
+        except CycleError as error:
+            edges = list(pairwise(error.args[1]))
+        else:
+            return
+        known = [edge for edge in edges if (edge[0][0], edge[1][0]) in overwritten and _overwrites(waits, edge)]
+        if not known:
+            yield _cycle(waits, edges)
+            return
+        yield overwritten[known[0][0][0], known[0][1][0]]
+        del waits[known[0][1]][known[0][0]]
+
+
+def _overwrites(waits: Waits, edge: tuple[StepKey, StepKey]) -> bool:
+    return waits[edge[1]][edge[0]][1] == "overwrites"
 
 
 def history_copies(steps: Iterable[Step], resources: Mapping[str, Resource]) -> dict[str, int]:
@@ -288,7 +311,7 @@ def _loads_nothing(step: Step, resource: str) -> Problem:
 
 def _cycle(waits: Waits, edges: Sequence[tuple[StepKey, StepKey]]) -> Problem:
     # An edge that only keeps a reader ahead of an overwriter is what the user can change: start the cycle there.
-    start = next((i for i, (a, b) in enumerate(edges) if waits[b][a][1] == "overwrites"), 0)
+    start = next((i for i, edge in enumerate(edges) if _overwrites(waits, edge)), 0)
     (reader, _), (writer, _) = edges[start]
     resource, _ = waits[edges[start][1]][edges[start][0]]
     back = edges[(start + 1) % len(edges)]

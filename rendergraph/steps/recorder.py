@@ -65,7 +65,18 @@ class StepRequest(Struct, frozen=True, gc=False):
     options: Mapping[str, Any] = field(default_factory=dict)
     caller: tuple[str, int] | None = None
 
+    @property
+    def reads(self) -> Iterator[Port | Part]:
+        """The ports whose textures, buffers or functions it reads."""
+        yield from self.bindings.values()
+        yield from self.options.get("attributes", {}).values()
+        for name in BUFFER_OPTIONS:
+            if isinstance(self.options.get(name), Port):
+                yield self.options[name]
 
+
+BUFFER_OPTIONS = ("vertices", "indices", "groups")
+"""Options of a step that may name a buffer."""
 Target: TypeAlias = Port | Part
 Defines: TypeAlias = Annotated[Mapping[str, Macro], "a mapping from macros to values"]
 IN_PLACE = ("<geometry.vert>", "<depth.vert>")
@@ -77,14 +88,14 @@ class Steps:
     """The list a node fills in `record`.
 
     Textures that a step reads are given by their name in the shader (`source=self.source`); a step that names none
-    reads every connected input under its own name. Other keyword values become the step's uniforms. `out` is a port, a
-    part, or a mapping from the shader's output names; by default the step writes every used output of the node. A
-    texture with a depth format is attached as depth. In drawing steps `port.stored()` binds a texture as an image, and
-    a buffer is bound as a storage block. Arguments that are None, such as a port that a subclass drops, are ignored. A
-    step with a `region` number is drawn in the rectangle that `update` sets for that number (`Frame.set_region`), until
-    then everywhere. A `label` is the step's name in plans and `bench --steps`, beside its node and number. A step that
-    draws nothing where an earlier one of the node drew nothing names that one's label (`if_drawn`): the device then
-    skips it, without the CPU waiting for the answer.
+    reads every connected input under its own name, except those given as None (`source=None`). Other keyword values
+    become the step's uniforms. `out` is a port, a part, or a mapping from the shader's output names; by default the
+    step writes every used output of the node. A texture with a depth format is attached as depth. In drawing steps
+    `port.stored()` binds a texture as an image, and a buffer is bound as a storage block. Ports that a subclass drops
+    are None, and ignored as well. A step with a `region` number is drawn in the rectangle that `update` sets for that
+    number (`Frame.set_region`), until then everywhere. A `label` is the step's name in plans and `bench --steps`,
+    beside its node and number. A step that draws nothing where an earlier one of the node drew nothing names that one's
+    label (`if_drawn`): the device then skips it, without the CPU waiting for the answer.
     """
 
     def __init__(self, ports: Mapping[str, Port], node_id: str, type_name: str, recorder: Recorder) -> None:
@@ -165,7 +176,7 @@ class Steps:
         if_drawn: str = "",
         defines: Defines | None = None,
         label: str = "",
-        **bindings: Target | UniformValue,
+        **bindings: Target | UniformValue | None,
     ) -> None:
         """Run one fragment shader over the whole target."""
         options = {"label": label, "state": state, "region": region, "if_drawn": if_drawn}
@@ -192,7 +203,7 @@ class Steps:
         in_place: bool | None = None,
         per_light: Count | None = None,
         topology: Literal["triangles", "triangles_adjacency"] = "triangles",
-        **bindings: Target | UniformValue,
+        **bindings: Target | UniformValue | None,
     ) -> None:
         """Draw the scene's objects, with one indirect multi-draw per batch.
 
@@ -246,7 +257,7 @@ class Steps:
         label: str = "",
         view: Port | None = None,
         view_index: Count | None = 0,
-        **bindings: Target | UniformValue,
+        **bindings: Target | UniformValue | None,
     ) -> None:
         """Draw the node's own buffers.
 
@@ -290,7 +301,7 @@ class Steps:
         out: Target | Mapping[str, Target] | None = None,
         defines: Defines | None = None,
         label: str = "",
-        **bindings: Target | UniformValue,
+        **bindings: Target | UniformValue | None,
     ) -> None:
         """Dispatch a compute shader: `out` is bound as images and buffers; barriers follow from the next readers.
 
@@ -380,7 +391,7 @@ class Steps:
         kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps", "resolve"],
         shaders: Mapping[str, str | None],
         out: Target | Mapping[str, Target] | None,
-        bindings: Mapping[str, Target | UniformValue],
+        bindings: Mapping[str, Target | UniformValue | None],
         defines: Defines | None,
         **options: Any,
     ) -> None:
@@ -402,8 +413,9 @@ class Steps:
         if "over" in options:
             options["invocations"] = self._invocations(options.pop("over"), targets, textures)
         reads: Mapping[str, Target] = textures
-        if len(uniforms) == len(bindings) and kind in ("fullscreen", "geometry", "draw", "compute"):
-            reads = self._recorder.reads(targets.values())
+        if not textures and kind in ("fullscreen", "geometry", "draw", "compute"):
+            every = self._recorder.reads(targets.values())
+            reads = {name: port for name, port in every.items() if bindings.get(name, port) is not None}
         self._recorder.add(
             StepRequest(
                 kind=kind,
@@ -418,14 +430,14 @@ class Steps:
         )
 
     def _bindings(
-        self, bindings: Mapping[str, Target | UniformValue]
+        self, bindings: Mapping[str, Target | UniformValue | None]
     ) -> tuple[dict[str, Target], dict[str, UniformValue]]:
         """Split keyword arguments into what a step reads, by the shader's name, and its own uniforms."""
         textures: dict[str, Target] = {}
         uniforms: dict[str, UniformValue] = {}
         for name, value in bindings.items():
-            if value is None and name not in self.ports:  # a port that the class drops
-                continue
+            if value is None and isinstance(self.ports.get(name), Input | InOut | None):
+                continue  # an input that the step does not read, or a port that the class drops
             if not isinstance(value, Port | Part):
                 uniforms[name] = checks.uniform(name, value)
                 continue

@@ -29,7 +29,6 @@ def record(self, steps):
 CALLS = {
     # ports and parts of ports
     'steps.fullscreen("wrong.frag", source="source")': "RG423 source='source': expected a port, a number or a list of numbers; give the port itself",
-    'steps.fullscreen("wrong.frag", source=None)': "RG423 source=None: expected a port, a number or a list of numbers",
     'steps.fullscreen("wrong.frag", source=self.views)': "RG423 source is the view table 'views'; give it as `view=` to a step that draws",
     'steps.fullscreen("wrong.frag", source=Internal(Radiance))': "RG424 source is an Internal made in place; declare it as an attribute of the class",
     'steps.fullscreen("wrong.frag", out="color")': "RG423 out is the text 'color'; give the port itself, self.color",

@@ -1,0 +1,123 @@
+"""Which recorded step comes before which, where nodes form a cycle: steps are what is scheduled, not nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import TypeAlias
+
+from rendergraph.declare import Function, InOut, Input, Part, Port
+from rendergraph.errors import InputError, Problem
+from rendergraph.expand.model import follow_forwards
+from rendergraph.expand.recording import Recording
+from rendergraph.link import Endpoint, Graph
+from rendergraph.link.graph import upstream_first
+
+_Step: TypeAlias = tuple[str, int]
+_Cause: TypeAlias = tuple[str, str, Endpoint]
+"""Why a step waits for another: the node that reads, its input or port, and what that is linked to."""
+
+
+def step_order(
+    graph: Graph, recordings: Mapping[str, Recording], forwarded: Mapping[Endpoint, Endpoint]
+) -> list[_Step]:
+    """Return node and number of every recorded step behind those whose results it needs; RG117 if there is a cycle."""
+    order = _StepOrder(graph, recordings, forwarded)
+    waits = {(name, number): order.waits(name, number) for name in recordings for number in order.numbers(name)}
+    found = upstream_first(waits)
+    if len(found) < len(waits):
+        raise InputError(order.cycle(waits))
+    return found
+
+
+class _StepOrder:
+    def __init__(
+        self, graph: Graph, recordings: Mapping[str, Recording], forwarded: Mapping[Endpoint, Endpoint]
+    ) -> None:
+        self.graph, self.recordings, self.forwarded = graph, recordings, forwarded
+        self.writers: dict[Endpoint, list[int]] = {}
+        for name, recording in recordings.items():
+            for number, request in enumerate(recording.requests):
+                for part in dict(request.out).values():
+                    self.writers.setdefault(Endpoint(name, part.port.name), []).append(number)
+
+    def numbers(self, name: str) -> range:
+        return range(len(self.recordings[name].requests))
+
+    def waits(self, name: str, number: int) -> dict[_Step, _Cause]:
+        """Return the steps that one waits for, each with a cause."""
+        found: dict[_Step, _Cause] = {}
+        recording = self.recordings[name]
+        request = recording.requests[number]
+        written = {part.port.name for _, part in request.out}
+        for target in (*request.reads, *(part for _, part in request.out)):
+            if not (isinstance(target, Part) and target.previous):
+                for key, cause in self._before(name, target, number):
+                    found.setdefault(key, cause)
+        for earlier in range(number):  # reads what this step writes over
+            for target in recording.requests[earlier].reads:
+                port = target.port if isinstance(target, Part) else target
+                if port.name in written and not (isinstance(target, Part) and target.previous):
+                    found.setdefault((name, earlier), (name, port.name, Endpoint(name, port.name)))
+        found.pop((name, number), None)
+        return found
+
+    def _before(self, name: str, target: Port | Part, number: int | None) -> Iterator[tuple[_Step, _Cause]]:
+        """Yield the steps that decide what a port holds for step `number` of its node; None behind all its steps."""
+        port, only = (target.port, target.link) if isinstance(target, Part) else (target, None)
+        own = Endpoint(name, port.name)
+        if isinstance(port, Function):
+            ports = self.graph[name].node.ports()
+            for read_name, read in zip(port.read_names, port.reads, strict=True):
+                if not (isinstance(read, Part) and read.previous):
+                    yield from self._before(name, ports[read_name], number)
+            return
+        for earlier in self.writers.get(own, ()):
+            if number is None or earlier < number:
+                yield (name, earlier), (name, port.name, own)
+        links = self.recordings[name].links.get(port.name, ()) if isinstance(port, Input | InOut) else ()
+        for at, end in enumerate(links):
+            source = follow_forwards(self.forwarded, end)
+            if end.previous or only not in (None, at) or source.node not in self.recordings:
+                continue
+            for key, _ in self._before(source.node, self.graph[source.node].node.ports()[source.port], None):
+                yield key, (name, port.name, end)
+
+    def cycle(self, waits: Mapping[_Step, Mapping[_Step, _Cause]]) -> Problem:
+        """Return the problem of one cycle, with its steps, nodes and links."""
+        from graphlib import CycleError, TopologicalSorter  # to name a cycle where there is one
+
+        steps: list[_Step] = []
+        try:
+            TopologicalSorter(waits).prepare()
+        except CycleError as error:
+            steps = error.args[1]
+        hops, place = [], None
+        for earlier, later in pairwise(steps):
+            node, name, end = waits[later][earlier]
+            value = self.graph.cyclic.get((node, name, end))
+            where = f" ({'line ' + str(value.place.line)})" if value is not None and value.place.line else ""
+            by = "" if node == later[0] else f" of '{node}'"
+            hops.append(f"{self._name(later)} reads '{end}'{by}{where}")
+            place = value if value is not None else place
+        if len(hops) > 6:
+            hops[3:-2] = ["…"]
+        every = [later for _, later in pairwise(steps) if self._reads_all(later)]
+        way = "'@previous' behind one reads last frame's value"
+        if every:
+            way = f"{self._name(every[0])} names no input, so it reads all: name in `record` what it reads; or {way}"
+        text = f"the steps form a cycle: {', '.join(hops)}; {way}"
+        return place.problem("RG117", text) if place is not None else Problem("RG117", text)
+
+    def _reads_all(self, key: _Step) -> bool:
+        recording = self.recordings[key[0]]
+        request = recording.requests[key[1]]
+        return request.caller is not None and request.bindings.keys() == recording.reads(()).keys() != set()
+
+    def _name(self, key: _Step) -> str:
+        name, number = key
+        request = self.recordings[name].requests[number]
+        label = f"{number} {request.options.get('label') or ''}".rstrip()
+        step = f"'{name}'" if len(self.recordings[name].requests) == 1 else f"step {label} of '{name}'"
+        return step + (f" ({Path(request.caller[0]).name}:{request.caller[1]})" if request.caller else "")

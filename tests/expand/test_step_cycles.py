@@ -1,0 +1,248 @@
+"""Nodes that form a cycle although their steps do not: one prepares something before others and composes after them."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from rendergraph.api import (
+    Function,
+    History,
+    InOut,
+    Input,
+    Internal,
+    Node,
+    Output,
+    Radiance,
+    ShadowLookup,
+    Steps,
+    param,
+)
+from rendergraph.diagrams import markup, picture
+from rendergraph.errors import InputError
+
+if TYPE_CHECKING:
+    import rendergraph as rg
+
+
+class Ground(Node):
+    """A ramp."""
+
+    color = Output(Radiance, format="rgba32f", doc="A ramp.")
+    shader = "ground.frag"
+
+
+class Bracket(Node):
+    """Halves something before others use it, and adds what they make of it afterwards."""
+
+    source = Input(Radiance, doc="Before.")
+    lit = Input(Radiance, optional=True, doc="What is made of `prepared`.")
+    table = Internal(Radiance, format="rgba32f", size=(4, 1), kept=True)
+    half = Internal(like="source")
+    trail = History(like="source")
+    prepared = Output(like="source", doc="Half.")
+    composed = Output(like="source", doc="The sum of all.")
+
+    gain: float = param(default=0.5, doc="Factor.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("table.frag", out=self.table, label="table", value=2.0)
+        steps.fullscreen("scale.frag", source=self.source, out=self.half)
+        steps.fullscreen("scale.frag", source=self.half, out=self.prepared)
+        if steps.connected(self.lit):
+            reads: dict[str, Any] = {
+                "lit": self.lit,
+                "before_half": self.half,
+                "table": self.table,
+                "before": self.trail.previous,
+            }
+            for out in (self.trail, self.composed):
+                steps.fullscreen("compose.frag", **reads, out=out, label="compose")
+
+
+class Continue(Node):
+    """Halves something before others use it, and adds to what they make of it, in place."""
+
+    source = Input(Radiance, doc="Before.")
+    radiance = InOut(Radiance, doc="After.")
+    prepared = Output(like="source", doc="Half.")
+
+    gain: float = param(default=0.5, doc="Factor.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("scale.frag", source=self.source, out=self.prepared)
+        steps.clear(self.radiance.mip(0), 0.25)
+
+
+class Light(Node):
+    """What is made of it: five times as much."""
+
+    prepared = Input(Radiance, doc="Half.")
+    radiance = Output(like="prepared", doc="Five times.")
+    shader = "light.frag"
+
+
+class Shade(Node):
+    """Provides a function of what was lit, and is lit by that."""
+
+    lit = Input(Radiance, optional=True, doc="What was lit.")
+    lookup = Function(ShadowLookup, shader="shade.glsl", reads=("lit",), doc="From what was lit.")
+    early = Output(Radiance, format="rgba32f", doc="Reads nothing.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("table.frag", lit=None, value=3.0, out=self.early)
+
+
+class Asks(Node):
+    """Calls the function."""
+
+    lookup = Input(ShadowLookup, kind="function", doc="What to call.")
+    color = Output(Radiance, format="rgba32f", doc="Its value.")
+    shader = "asks.frag"
+
+
+SHADERS = {
+    "ground.frag": "out vec4 color; void main() { color = vec4(gl_FragCoord.x); }",
+    "table.frag": "uniform float value; out vec4 table; void main() { table = vec4(value); }",
+    "scale.frag": """uniform sampler2D source; uniform float gain; out vec4 prepared;
+        void main() { prepared = gain * texelFetch(source, ivec2(gl_FragCoord.xy), 0); }""",
+    "light.frag": """uniform sampler2D prepared; out vec4 radiance;
+        void main() { radiance = 5.0 * texelFetch(prepared, ivec2(gl_FragCoord.xy), 0); }""",
+    "compose.frag": """uniform sampler2D lit, table, before, before_half; out vec4 composed;
+        void main() { ivec2 p = ivec2(gl_FragCoord.xy); composed = texelFetch(lit, p, 0) + texelFetch(before_half, p, 0)
+            + texelFetch(table, ivec2(0), 0) + texelFetch(before, p, 0); }""",
+    "shade.glsl": """uniform sampler2D lit;
+        float shadow(int light, vec3 position, vec3 normal) { return texelFetch(lit, ivec2(0), 0).x; }""",
+    "asks.frag": "out vec4 color; void main() { color = vec4(shadow(0, vec3(0.0), vec3(0.0))); }",
+}
+NODES = (Ground, Bracket, Continue, Light, Shade, Asks)
+TEXT = """nodes:
+  bracket: {type: bracket, inputs: {source: ground.color, lit: light.radiance}}
+  light: {type: light, inputs: {prepared: bracket.prepared}}
+  ground: {type: ground}
+outputs: {image: bracket.composed}
+"""
+X = np.arange(16, dtype=np.float32)[None, :] + 0.5
+
+
+def steps_of(pipeline: rg.Pipeline) -> list[str]:
+    return [node for node, _ in groupby(step.node for step in pipeline.check().plan.schedule.steps)]
+
+
+@pytest.mark.parametrize("mode", [{}, {"shuffle": 3, "poison": True}, {"alias": False, "reuse": False}])
+def test_a_node_stands_before_and_behind_another(bench: Any, gl: rg.Session, mode: dict[str, Any]) -> None:
+    pipeline = bench.pipeline(TEXT, *NODES, shaders=SHADERS)
+    for number, frame in enumerate(gl.frames(pipeline, frames=range(1, 4), **mode), start=1):
+        # 5/4 of the ramp is lit, and half of it and 2 are added; so is the sum of the frame before.
+        expected = number * (5 * 0.25 * X + 0.5 * X + 2)
+        np.testing.assert_array_equal(frame["image"][..., 0], np.broadcast_to(expected, (8, 16)))
+
+
+def test_its_picture_follows_its_parameters(bench: Any, gl: rg.Session) -> None:
+    pipeline = bench.pipeline(TEXT, *NODES, shaders=SHADERS)
+    assert gl.render(pipeline.set("bracket.gain", 1.0))["image"][0, 0, 0] == 5 * 0.5 + 0.5 + 2
+
+
+def test_it_is_scheduled_drawn_as_a_graph_and_listed(bench: Any) -> None:
+    pipeline = bench.pipeline(TEXT, *NODES, shaders=SHADERS)
+    assert steps_of(pipeline)[-3:] == ["bracket", "light", "bracket"]
+    graph = pipeline.link().graph
+    assert graph.reading_order().index("ground") < graph.reading_order().index("bracket")
+    assert markup.text(graph).count("light.radiance") == 1
+    assert all(node in picture.svg(graph) for node in graph.members)
+    assert "back" not in markup.graph_json(graph)["links"][0]
+
+
+def test_it_continues_what_was_made_of_what_it_prepared(bench: Any, gl: rg.Session) -> None:
+    text = """nodes:
+  ground: {type: ground}
+  around: {type: continue, inputs: {source: ground.color, radiance: light.radiance}}
+  light: {type: light, inputs: {prepared: around.prepared}}
+  other: {type: light, inputs: {prepared: light.radiance}}
+outputs: {image: around.radiance, other: other.radiance}
+"""
+    frame = gl.render(bench.pipeline(text, *NODES, shaders=SHADERS))
+    np.testing.assert_array_equal(frame["image"], np.full((8, 16, 4), 0.25))
+    np.testing.assert_array_equal(frame["other"][0, :, 0], 12.5 * X[0])  # which reads it before that
+
+
+def test_it_provides_a_function_of_what_was_made_of_its_first_step(bench: Any, gl: rg.Session) -> None:
+    text = """nodes:
+  shade: {type: shade, inputs: {lit: light.radiance}}
+  light: {type: light, inputs: {prepared: shade.early}}
+  asks: {type: asks, inputs: {lookup: shade.lookup}}
+outputs: {image: asks.color}
+"""
+    assert gl.render(bench.pipeline(text, *NODES, shaders=SHADERS))["image"][0, 0, 0] == 15
+
+
+def test_a_sub_pipeline_stands_around_others(bench: Any, gl: rg.Session) -> None:
+    (bench.folder / "inner.yaml").write_text("""rendergraph: 1
+inputs: {source: {semantic: radiance}, lit: {semantic: radiance}}
+nodes:
+  first: {type: light, inputs: {prepared: inputs.source}}
+  second: {type: light, inputs: {prepared: inputs.lit}}
+outputs: {early: first.radiance, late: second.radiance}
+""")
+    text = """nodes:
+  ground: {type: ground}
+  inner: {type: ./inner.yaml, inputs: {source: ground.color, lit: light.radiance}}
+  light: {type: light, inputs: {prepared: inner.early}}
+outputs: {image: inner.late}
+"""
+    frame = gl.render(bench.pipeline(text, *NODES, shaders=SHADERS))
+    np.testing.assert_array_equal(frame["image"][0, :, 0], 125 * X[0])
+
+
+def said(bench: Any, text: str) -> list[str]:
+    with pytest.raises(InputError) as caught:
+        bench.pipeline(text, *NODES, shaders=SHADERS).check()
+    return [str(problem).replace(f"{bench.folder}/", "") for problem in caught.value.problems]
+
+
+class Careless(Node):
+    """Two steps, of which the first reads more than it says."""
+
+    source = Input(Radiance, doc="Before.")
+    lit = Input(Radiance, optional=True, doc="What is made of `prepared`.")
+    prepared = Output(Radiance, format="rgba32f", doc="Half.")
+    composed = Output(Radiance, format="rgba32f", doc="All.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("scale.frag", out=self.prepared, gain=0.5)
+        steps.fullscreen("scale.frag", source=self.lit, out={"prepared": self.composed}, gain=0.5)
+
+
+def test_a_cycle_of_steps_is_named_with_steps_nodes_and_lines(bench: Any) -> None:
+    with pytest.raises(InputError) as caught:
+        bench.pipeline(TEXT.replace("type: bracket", "type: careless"), *NODES, Careless, shaders=SHADERS).check()
+    (problem,) = caught.value.problems
+    assert problem.code == "RG117"
+    assert problem.place is not None
+    assert problem.place.line in (4, 5)
+    line = Careless.record.__code__.co_firstlineno + 1
+    step = f"step 0 of 'bracket' (test_step_cycles.py:{line})"
+    assert f"{step} reads 'light.radiance' (line 4)" in problem.message
+    assert "'light' reads 'bracket.prepared' (line 5)" in problem.message
+    assert f"{step} names no input, so it reads all: name in `record` what it reads" in problem.message
+
+
+def test_certain_cycles_are_refused_before_steps_are_recorded(bench: Any) -> None:
+    (one,) = said(bench, TEXT.replace("source: ground.color", "source: light.radiance"))  # `prepared` is like it
+    assert "RG117 the nodes form a cycle, bracket.prepared → light.radiance → bracket.prepared" in one
+
+
+def test_a_reader_between_two_steps_of_the_node_that_overwrites(bench: Any) -> None:
+    text = """nodes:
+  ground: {type: ground}
+  around: {type: continue, inputs: {source: other.radiance, radiance: light.radiance}}
+  light: {type: light, inputs: {prepared: ground.color}}
+  other: {type: light, inputs: {prepared: light.radiance}}
+  late: {type: bracket, inputs: {source: around.radiance, lit: light.radiance}}
+outputs: {image: late.composed}
+"""
+    (one,) = said(bench, text)
+    assert one.startswith("test.yaml:8:64: RG128 'late.lit' reads 'light.radiance', but 'late' also needs ")
