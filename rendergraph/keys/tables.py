@@ -176,6 +176,9 @@ def as_markdown(value: Any) -> Any:
     return {key: as_markdown(part) for key, part in value.items()} | more
 
 
+_GIVEN: Schema = {"not": {"type": "null"}}
+
+
 def _table(table: Table) -> Schema:
     required = [key.name for key in table.keys if key.required]
     found = {
@@ -189,14 +192,14 @@ def _table(table: Table) -> Schema:
     rules = []
     for name, allowed in table.alternatives.items():
         for word, keys in [(None, allowed)] if isinstance(allowed, tuple) else allowed.items():
-            condition = {"type": "string"} if word is None else {"const": word}
+            condition = _GIVEN if word is None else {"const": word}
             rules.append(
                 {
                     "if": {"properties": {name: condition}, "required": [name]},
                     "then": {"properties": common | _properties(keys), "additionalProperties": False},
                 }
             )
-    one = [{"properties": {name: {"type": "string"}}, "required": [name]} for name in table.alternatives]
+    one = [{"properties": {name: _GIVEN}, "required": [name]} for name in table.alternatives]
     return {**found, "oneOf": one, "allOf": rules}
 
 
@@ -216,6 +219,8 @@ def _properties(keys: tuple[Key, ...]) -> Schema:
 
 def nullable(values: Schema) -> Schema:
     """Return a schema that also accepts null, which means absent."""
+    if "oneOf" in values:  # of which null would be each
+        return {"anyOf": [values, {"type": "null"}]}
     if "anyOf" in values:
         return {**values, "anyOf": [*values["anyOf"], {"type": "null"}]}
     enum = {"enum": [*values["enum"], None]} if "enum" in values else {}

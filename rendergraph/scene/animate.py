@@ -15,7 +15,7 @@ from rendergraph.scene import scene_values
 from rendergraph.scene.cameras import WIDE, bounding_sphere, framing_camera
 from rendergraph.scene.environments import shipped
 from rendergraph.scene.geometry import rigid, translation, vec3
-from rendergraph.scene.model import Camera, Light, Scene
+from rendergraph.scene.model import Camera, Light, Placement, Scene
 
 KEY_LUX = 3.0
 STUDIO_FILL = 0.6
@@ -109,7 +109,9 @@ def _changed(scene: Scene, section: str, name: str, values: Mapping[str, Any]) -
             return replace(scene, cameras={**scene.cameras, name: scene_values.camera(name, values)})
         if section == "lights":
             light = scene_values.light(name, values)
-            return replace(scene, lights=tuple(light if entry.name == name else entry for entry in scene.lights))
+            copies = scene.copies.get((section, name))
+            made = {entry.name: entry for entry in ([light] if copies is None else copies.lights(light))}
+            return replace(scene, lights=tuple(made.get(entry.name, entry) for entry in scene.lights))
     except ValueError as problem:  # two moving values can meet in between: eye and target, near and far
         text = f"keyframes bring {section}.{name} to an impossible state: {problem}"
         raise InputError(Problem("RG323", text, Place(str(scene.source)) if scene.source else None)) from None
@@ -121,14 +123,14 @@ def _changed(scene: Scene, section: str, name: str, values: Mapping[str, Any]) -
 
 
 def _placed_again(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
-    if name not in scene.placements:
-        return scene
-    world, placement = scene_values.placed(values), scene.placements[name]
+    world, copies = scene_values.placed(values), scene.copies.get(("objects", name))
     objects, lights, cameras = list(scene.objects), list(scene.lights), dict(scene.cameras)
-    for index, local in placement.objects:
-        objects[index] = replace(objects[index], transform=world @ local)
-    for index, local in placement.lights:
-        lights[index] = scene_values.moved_light(lights[index], world @ local)
-    for camera, local in placement.cameras:
-        cameras[camera] = replace(cameras[camera], transform=rigid(world @ local))
+    for copy, matrix in [(name, world)] if copies is None else copies.placed(name, world):
+        placement = scene.placements.get(copy, Placement())
+        for index, local in placement.objects:
+            objects[index] = replace(objects[index], transform=matrix @ local)
+        for index, local in placement.lights:
+            lights[index] = scene_values.moved_light(lights[index], matrix @ local)
+        for camera, local in placement.cameras:
+            cameras[camera] = replace(cameras[camera], transform=rigid(matrix @ local))
     return replace(scene, objects=tuple(objects), lights=tuple(lights), cameras=cameras)

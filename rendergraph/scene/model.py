@@ -119,6 +119,7 @@ class SceneLimits(Struct, frozen=True):
         file_bytes: bytes of one mesh or buffer file.
         vertices: vertices of one scene, before and after corners are split.
         objects: placed objects of one scene.
+        lights: lights of one scene file.
         memory_bytes: memory for what a file declares without containing it, such as accessors without a view.
         image_side: texels along one side of an image.
         image_bytes: decoded bytes of one image.
@@ -129,6 +130,7 @@ class SceneLimits(Struct, frozen=True):
     file_bytes: int = 2 << 30
     vertices: int = 100_000_000
     objects: int = 500_000
+    lights: int = 100_000
     memory_bytes: int = 256 << 20
     image_side: int = 16384
     image_bytes: int = 2 << 30
@@ -335,7 +337,8 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         keyframes: dotted path to times in seconds and values, linear between, held outside.
         warnings: what a reader left out, replaced or clamped, once for each kind and file.
         recipe: section and name (`("cameras", "main")`) to the values in the scene file, which keyframes change.
-        placements: name of a scene file's object to its parts.
+        placements: name of a scene file's object, or of one copy of it, to its parts.
+        copies: section and name of a scene file's entry to its `repeat.Copies`.
         files: every file accessed while reading it, as it was.
     """
 
@@ -352,6 +355,7 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
     warnings: tuple[Any, ...] = ()
     recipe: Mapping[tuple[str, str], Mapping[str, Any]] = field(default_factory=dict)
     placements: Mapping[str, Placement] = field(default_factory=dict)
+    copies: Mapping[tuple[str, str], Any] = field(default_factory=dict)
     files: Stamps = field(default_factory=dict)
 
     @cached_property

@@ -263,16 +263,21 @@ def pack_material_uvs(materials: Sequence[Material]) -> tuple[Floats, Bools]:
 def pack_lights(lights: Sequence[Light]) -> Records:
     """`Light` records (shaders/include/lights.glsl), in the scene's order."""
     table = np.zeros(len(lights), LIGHT)
-    for record, light in zip(table, lights, strict=True):
-        directional = light.type == "directional"
-        place = [-value for value in light.direction] if directional else light.position
-        record["position"] = (*place, 0.0 if directional else 1.0)
-        record["color"] = (*(value * light.intensity for value in light.color), 1 / light.range if light.range else 0.0)
-        record["direction"] = (*light.direction, _LIGHT_TYPES[light.type])
-        record["cone"] = (0.0, 1.0, 0.0, 0.0)
-        if light.type == "spot":
-            s = 1 / max(0.001, np.cos(light.inner) - np.cos(light.outer))
-            record["cone"] = (s, -np.cos(light.outer) * s, 0.0, 0.0)
+    if not lights:
+        return table
+    kinds = np.array([_LIGHT_TYPES[light.type] for light in lights])
+    is_directional, is_spot = (kinds == _LIGHT_TYPES[kind] for kind in ("directional", "spot"))
+    position, direction, color = (
+        np.array([getattr(light, key) for light in lights], np.float64) for key in ("position", "direction", "color")
+    )
+    table["position"][:, :3] = np.where(is_directional[:, None], -direction, position)
+    table["position"][:, 3] = ~is_directional
+    table["color"][:, :3] = color * np.array([[light.intensity] for light in lights], np.float64)
+    table["color"][:, 3] = [1 / light.range if light.range else 0.0 for light in lights]
+    table["direction"][:, :3], table["direction"][:, 3] = direction, kinds
+    inner, outer = np.cos(np.array([(light.inner, light.outer) for light in lights], np.float64)).T
+    scale = 1 / np.maximum(0.001, inner - outer)
+    table["cone"][:, :2] = np.where(is_spot[:, None], np.stack([scale, -outer * scale], axis=-1), (0.0, 1.0))
     return table
 
 

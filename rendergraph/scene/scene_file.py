@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
@@ -21,8 +22,21 @@ from rendergraph.scene import scene_keys, scene_values
 from rendergraph.scene.environments import named
 from rendergraph.scene.geometry import rigid
 from rendergraph.scene.mesh_files import MESHES, read_mesh
-from rendergraph.scene.model import Camera, Environment, Light, Material, Mesh, Object, Orbit, Placement, Scene, Texture
+from rendergraph.scene.model import (
+    Camera,
+    Environment,
+    Light,
+    Material,
+    Matrix,
+    Mesh,
+    Object,
+    Orbit,
+    Placement,
+    Scene,
+    Texture,
+)
 from rendergraph.scene.reading import Reading
+from rendergraph.scene.repeat import Copies, copies, count_of, read_columns
 from rendergraph.scene.shapes import SHAPES, ShapePart, build
 
 _DEFAULT = Material("default", base_color=(0.8, 0.8, 0.8, 1.0))
@@ -64,14 +78,17 @@ class _Reader:
         self.lights: list[Light] = []
         self.cameras: dict[str, Camera] = {}
         self.placements: dict[str, Placement] = {}
+        self.copies: dict[tuple[str, str], Copies] = {}
         self.shapes: dict[tuple[Any, ...], tuple[int, list[ShapePart]]] = {}
         self.files: dict[Path, _File] = {}
         self.material_numbers: dict[str | None, int] = {}
+        self.names: dict[str, tuple[str, ...]] = {}
         self.vertices = 0
 
     def read(self, root: Value) -> Scene:
         """The scene; only to be used if no problem was found."""
-        names = {section: tuple(_entries(root, section)) for section in ("objects", "materials", "lights", "cameras")}
+        sections = ("objects", "materials", "lights", "cameras")
+        self.names = names = {section: tuple(_entries(root, section)) for section in sections}
         top = self.validator.file(root, scene_keys.SCENE, "`scene: 1` and `objects`")
         if top is None:
             return Scene(self.path.stem)
@@ -80,8 +97,6 @@ class _Reader:
                 read(name, entry)
         for name, entry in _entries(top, "objects").items():
             self._object(name, entry, names["materials"])
-            if len(self.objects) > self.reading.limits.objects:
-                raise self._over(entry, f"{len(self.objects):,} objects", "objects")
         environment = self._environment(top.get("environment"))
         return Scene(
             self.path.stem,
@@ -96,13 +111,18 @@ class _Reader:
             self._orbit(top.get("orbit")),
             recipe=self.recipe,
             placements=self.placements,
+            copies=self.copies,
         )
 
     def _check_name(self, entry: Value, key: str, known: Iterable[str], section: str) -> None:
         value = entry.get(key)
-        if value is not None and value.data is not None and str(value.data) not in known:
+        if value is not None and value.data is not None:
+            self._check_text(value, key, known, section)
+
+    def _check_text(self, value: Value, what: str, known: Iterable[str], section: str) -> None:
+        if str(value.data) not in known:
             hint = suggestion(str(value.data), known) or f"; there are no {section}"
-            self.validator.report(value, "RG322", f"there is no {key} '{shown(value.data)}'{hint}")
+            self.validator.report(value, "RG322", f"there is no {what} '{shown(value.data)}'{hint}")
 
     @contextmanager
     def _reading_file(self, place: Value) -> Iterator[None]:
@@ -135,9 +155,47 @@ class _Reader:
         self.recipe["lights", name] = values = plain(entry, scene_keys.LIGHT)
         if "type" in values:
             try:
-                self.lights.append(scene_values.light(name, values))
+                light = scene_values.light(name, values)
             except ValueError as problem:
                 self.validator.report(entry, "RG321", f"light '{shown(name)}': {problem}", key=True)
+                return
+            copied = self._copies("lights", name, entry, values)
+            self.lights += [light] if copied is None else copied.lights(light)
+            if len(self.lights) > self.reading.limits.lights:
+                raise self._over(entry, f"{len(self.lights):,} lights", "lights")
+
+    def _copies(self, section: str, name: str, entry: Value, values: dict[str, Any]) -> Copies | None:
+        """The copies of an entry, none for one whose `repeat` is wrong; None without `repeat`."""
+        repeat = values.pop("repeat", None)
+        if not repeat:
+            return None
+        place = _value(entry, "repeat")
+        for other in self.names[section]:
+            if other.startswith(f"{name}.") and other.removeprefix(f"{name}.").isdigit():
+                text = f"'{shown(other)}' is the name of a copy of '{shown(name)}'; rename one"
+                self.validator.report(entry, "RG321", text, key=True)
+        limit = "objects" if section == "objects" else "lights"
+        most = getattr(self.reading.limits, limit)
+        found = Copies(np.zeros((0, 3)))
+        columns: dict[str, Any] = {}
+        if "file" in repeat:
+            with self._reading_file(_value(place, "file")):
+                columns = self._columns(section, repeat["file"], _value(place, "file"), most)
+        with self._reading_file(place):
+            count = len(next(iter(columns.values()))) if columns else count_of(repeat)
+            if count > most:
+                raise self._over(place, f"{count:,} copies", limit)
+            found = copies(repeat, columns) if count else found
+        self.copies[section, name] = found
+        return found
+
+    def _columns(self, section: str, file: str, place: Value, most: int) -> dict[str, Any]:
+        path = self.reading.resolve(file, line=place.line)
+        data = self.reading.read(path, "file of copies")
+        try:
+            return read_columns(data, path.suffix.lower(), section, most, self.reading.limits.memory_bytes)
+        except ValueError as problem:
+            raise InputError(place.problem("RG321", f"'{shown(file)}' {problem}")) from None
 
     def _camera(self, name: str, entry: Value) -> None:
         self.recipe["cameras", name] = values = plain(entry, scene_keys.CAMERA)
@@ -176,14 +234,30 @@ class _Reader:
     def _object(self, name: str, entry: Value, materials: Sequence[str]) -> None:
         self._check_name(entry, "material", materials, "materials")
         values = plain(entry, scene_keys.OBJECT)
+        for choice in _listed(entry.get("repeat", "choose", "material")):
+            self._check_text(choice, "material", materials, "materials")
+        copied = self._copies("objects", name, entry, values)
         keys = [key.name for key in scene_keys.OBJECT.keys]
         self.recipe["objects", name] = {key: values[key] for key in keys if key in values}
+        world = scene_values.placed(values)
+        placed = [(name, world)] if copied is None else copied.placed(name, world)
+        chosen = copied.values.get("material") if copied is not None else None
+        one = values.get("material")
+        each = [(*copy, chosen[number] if chosen else one) for number, copy in enumerate(placed)]
         if "shape" in values:
-            self._shape(name, entry, values)
+            self._shape(name, entry, values, each)
         elif "file" in values:
             place = _value(entry, "file")
             with self._reading_file(place):
-                self._file(name, entry, self._read_file(name, values["file"], place), values, materials)
+                file = self._read_file(name, values["file"], place)
+                overrides = self._overrides(_entries(entry, "overrides"), name, file.scene, materials)
+                self._check_count(entry, len(each) * len(file.scene.objects))
+                for copy, matrix, material in each:
+                    self._file(copy, matrix, file, values | {"material": material}, overrides)
+
+    def _check_count(self, entry: Value, more: int) -> None:
+        if len(self.objects) + more > self.reading.limits.objects:
+            raise self._over(entry, f"{len(self.objects) + more:,} objects", "objects")
 
     def _material_index(self, name: str | None) -> int:
         if name not in self.material_numbers:
@@ -191,7 +265,10 @@ class _Reader:
             self.materials.append(_DEFAULT)
         return self.material_numbers[name]
 
-    def _shape(self, name: str, entry: Value, values: dict[str, Any]) -> None:
+    def _shape(
+        self, name: str, entry: Value, values: dict[str, Any], placed: Sequence[tuple[str, Matrix, str | None]]
+    ) -> None:
+        """Add the copies of a shape, which share its mesh; copies of one material share those of its parts, too."""
         shape = values["shape"]
         numbers = {key.name: values.get(key.name, key.default) for key in SHAPES[shape].keys}
         key = (shape, *sorted(numbers.items()))
@@ -202,22 +279,28 @@ class _Reader:
             self.shapes[key] = len(self.meshes), build(shape, **numbers)
             self.meshes.append(self.shapes[key][1][0].mesh)  # all parts of a shape share it
         mesh, parts = self.shapes[key]
-        world, base = scene_values.placed(values), self._material_index(values.get("material"))
+        self._check_count(entry, len(placed) * len(parts))
         casts_shadow, hidden = values.get("casts_shadow", True), values.get("hidden", False)
-        first = len(self.objects)
-        for part in parts:
-            material, part_name = base, name + part.suffix
-            if part.changes:
-                material = len(self.materials)
-                changes: dict[str, Any] = dict(part.changes)
-                self.materials.append(replace(self.materials[base], name=part_name, **changes))
-            transform = world @ part.local
-            self.objects.append(Object(part_name, mesh, material, transform, casts_shadow, hidden, name))
-        self.placements[name] = Placement(tuple((first + k, part.local) for k, part in enumerate(parts)))
+        made: dict[tuple[int, str], int] = {}
+        for copy, world, material_name in placed:
+            base = self._material_index(material_name)
+            first = len(self.objects)
+            for part in parts:
+                material = base
+                if part.changes:
+                    if (base, part.suffix) not in made:
+                        made[base, part.suffix] = len(self.materials)
+                        more: dict[str, Any] = dict(part.changes)
+                        self.materials.append(replace(self.materials[base], name=name + part.suffix, **more))
+                    material = made[base, part.suffix]
+                transform = world @ part.local
+                self.objects.append(Object(copy + part.suffix, mesh, material, transform, casts_shadow, hidden, copy))
+            self.placements[copy] = Placement(tuple((first + k, part.local) for k, part in enumerate(parts)))
 
-    def _file(self, name: str, entry: Value, file: _File, values: dict[str, Any], materials: Sequence[str]) -> None:
-        scene, world = file.scene, scene_values.placed(values)
-        overrides = self._overrides(_entries(entry, "overrides"), name, scene, materials)
+    def _file(
+        self, name: str, world: Matrix, file: _File, values: dict[str, Any], overrides: Mapping[str, dict[str, Any]]
+    ) -> None:
+        scene = file.scene
         objects, lights, cameras = [], [], []
         for part in scene.objects:
             changes = values | overrides.get(part.name, overrides.get(part.node, {}))
@@ -317,6 +400,10 @@ class _Reader:
 def _entries(value: Value, section: str) -> dict[str, Value]:
     entries = value.get(section)
     return dict(entries.items()) if entries is not None else {}
+
+
+def _listed(value: Value | None) -> list[Value]:
+    return value.data if value is not None and isinstance(value.data, list) else []
 
 
 def _value(entry: Value, key: str) -> Value:

@@ -5,13 +5,58 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from rendergraph.keys import Codes, Key, MapOf, Table, schema
-from rendergraph.keys.values import FILE, TEXT, choice, color, number, scale, vector, version
+from rendergraph.keys.values import FILE, TEXT, choice, color, listed, number, row, scale, vector, version, whole
 from rendergraph.scene.shapes import LENGTH, SHAPES
 from rendergraph.typecheck import Brief, JsonSchema, Schema, is_numeric
 
 _DIRECTION = "unit length is not needed"
 
 NAME: Any = Annotated[TEXT, Brief("name")]
+
+MOST_COPIES = 10_000_000
+"""Limit of one number under `repeat`; those of a scene are in `SceneLimits`."""
+_COPIES: Any = whole(1, MOST_COPIES)
+
+
+def _share(name: str, what: str) -> Key:
+    return Key(name, number(0, 1), f"Greatest share by which {what} changes, up or down.", 0.0)
+
+
+def _repeat(vary: tuple[Key, ...], choose: tuple[Key, ...]) -> Table:
+    """The table of copies of an entry; `vary` and `choose` may change these keys from copy to copy."""
+    spread = "number, or one for each axis; each copy gets a random value from minus to plus this"
+    at = Key("at", scale(), f"Random displacement: a {spread}.", (0.0, 0.0, 0.0), "m")
+    turn = Key("rotate_degrees", scale(), f"Random turn: a {spread}.", (0.0, 0.0, 0.0), "°")
+    order = Key("order", choice("random", "turn"), "Pick at random, or one after the other (`turn`).", "random")
+    return Table(
+        "repeat",
+        (
+            Key("grid", row(_COPIES, _COPIES, _COPIES), "Copies along x, y and z; the first is where the entry is."),
+            Key("line", _COPIES, "Number of copies in a line; the first is where the entry is."),
+            Key("ring", _COPIES, "Number of copies on a circle around the entry's position, in the plane of x and z."),
+            Key("scatter", _COPIES, "Number of copies at random positions in a box around the entry's position."),
+            Key("file", FILE, "A file with a row for each copy (.csv, .npz, .json); positions are added to `at`."),
+            Key("vary", Table("vary", (at, turn, *vary)), "Random changes of each copy."),
+            Key("choose", Table("choose", (order, *choose)), "Lists of values, of which each copy gets one."),
+            Key("seed", whole(0, 2**32 - 1), "Another seed gives other random numbers.", 0),
+        ),
+        {
+            "grid": (
+                Key("step", vector(), "With `grid`: distances between neighbours.", (1.0, 1.0, 1.0), "m"),
+                Key("centered", bool, "With `grid`: the entry's position is the middle of the grid.", False),
+            ),
+            "line": (Key("step", vector(), "With `line`: vector from one copy to the next.", (1.0, 0.0, 0.0), "m"),),
+            "ring": (
+                Key("radius", LENGTH, "With `ring`: radius of the circle.", 1.0, "m"),
+                Key("start_degrees", number(), "With `ring`: where the first copy is: 0 at +x, 90 at -z.", 0.0, "°"),
+                Key("arc_degrees", number(-360, 360), "With `ring`: the arc, both ends included.", 360.0, "°"),
+                Key("turned", bool, "With `ring`: copies turn with the circle, as spokes do.", False),
+            ),
+            "scatter": (Key("size", vector(3, 0), "With `scatter`: edges of the box.", (1.0, 1.0, 1.0), "m"),),
+            "file": (),
+        },
+    )
+
 
 _OVERRIDABLE = (
     Key("material", NAME, "A name under `materials`; a file keeps its own materials without it."),
@@ -28,6 +73,14 @@ OBJECT = Table(
         Key("rotate_degrees", vector(), "Turns about X, then Y, then Z.", (0.0, 0.0, 0.0), "°"),
         Key("scale", scale(), "One factor, or one for each axis; applied before turning.", (1.0, 1.0, 1.0)),
         *_OVERRIDABLE,
+        Key(
+            "repeat",
+            _repeat(
+                (_share("scale", "the size"),),
+                (Key("material", listed(NAME, "names", 1), "Names under `materials`."),),
+            ),
+            "Draws it many times; the copies are called `name.0`, `name.1` and so on.",
+        ),
     ),
     {
         "shape": {name: shape.keys for name, shape in SHAPES.items()},
@@ -95,6 +148,17 @@ LIGHT = Table(
         Key("inner_degrees", number(0, 90), "Half angle of the spot's full brightness.", 0.0, "°"),
         Key("outer_degrees", number(0, 90, above=True), "Half angle where the spot ends.", 45.0, "°"),
         Key("casts_shadow", bool, "Whether `shadow_map.light: auto` may choose it.", True),
+        Key(
+            "repeat",
+            _repeat(
+                (_share("color", "each channel of the colour"), _share("intensity", "the intensity")),
+                (
+                    Key("color", listed(color(), "colours", 1), "Linear colours."),
+                    Key("intensity", listed(number(0), "numbers from 0 up", 1), "Intensities."),
+                ),
+            ),
+            "Makes many of it; the copies are called `name.0`, `name.1` and so on.",
+        ),
     ),
 )
 

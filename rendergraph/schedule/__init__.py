@@ -7,6 +7,7 @@ live bytes. The least peak over all orders is searched for separately and report
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from functools import cached_property
 
@@ -105,7 +106,11 @@ def schedule(
         keep_order: use the program's order instead, for debugging; takes precedence over `shuffle`.
     """
     if len(expansion.steps) > MOST_STEPS:
-        text = f"the pipeline has {len(expansion.steps)} steps, more than {MOST_STEPS}; use fewer nodes or lower counts"
+        (node, most), *_ = Counter(step.node for step in expansion.steps).most_common(1)
+        text = (
+            f"the pipeline has {len(expansion.steps)} steps, more than {MOST_STEPS}; {most} of them belong to node "
+            f"'{node}': lower its counts, or use another node if it records a step for each light"
+        )
         raise InputError(Problem("RG606", text))
     versions = Versions.of(expansion.steps)
     kept = contributing(expansion.steps, expansion.resources, expansion.outputs, versions, expansion.idle)

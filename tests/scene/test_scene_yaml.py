@@ -253,7 +253,7 @@ def test_shipped_scene(name: str) -> None:
     path = shipped_scenes()[name]
     lines = path.read_text().splitlines()
     assert lines[0].startswith("# ")
-    longer = {"avenue": 120, "many_lights": 120, "courtyard": 60}  # whose columns, bulbs and beams stand in rows
+    longer = {"many_lights": 120, "courtyard": 60}  # whose bulbs and stones differ from each other
     assert len(lines) <= longer.get(name, 40)
     scene = load(path)
     assert scene.warnings == ()

@@ -1,0 +1,292 @@
+"""Copies of an object or light: where they are, and what tells them apart (`repeat:` of a scene file)."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+from msgspec import Struct
+
+from rendergraph.errors import suggestion
+from rendergraph.projection import unit
+from rendergraph.scene.model import FARTHEST, Light, Matrix
+
+Doubles = npt.NDArray[np.float64]
+
+COLUMNS = {
+    "objects": {"at": 3, "rotate_degrees": 3, "scale": 1},
+    "lights": {"at": 3, "color": 3, "intensity": 1, "range": 1},
+}
+"""What a file of copies may give for each copy, by section, with the count of its numbers."""
+_CSV = {
+    **{axis: ("at", number) for number, axis in enumerate("xyz")},
+    **{channel: ("color", number) for number, channel in enumerate("rgb")},
+    **{f"rotate_{axis}": ("rotate_degrees", number) for number, axis in enumerate("xyz")},
+    **{name: (name, 0) for name in ("scale", "intensity", "range")},
+}
+"""The columns of a table in text, with the key and the number within it."""
+_BROKEN = (ValueError, OSError, EOFError, KeyError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)
+"""What NumPy raises for a broken file."""
+_RANDOM = ("at", "rotate_degrees", "scale", "color", "intensity", "choose")
+"""What is varied. Each has random numbers of its own, so that one more does not change the others."""
+
+
+class Copies(Struct, frozen=True, eq=False):
+    """The n copies of an entry, as changes of the entry itself.
+
+    Attributes:
+        offsets: metres from the entry's position, (n, 3).
+        turns: applied after the entry's own rotation and scale, about its position, (n, 3, 3); None for none.
+        values: by key, what a copy has in place of the entry's value.
+        factors: by key, what the entry's value is multiplied by, (n, 1) or (n, 3).
+    """
+
+    offsets: Doubles
+    turns: Doubles | None = None
+    values: Mapping[str, Sequence[Any]] = {}
+    factors: Mapping[str, Doubles] = {}
+
+    def placed(self, name: str, world: Matrix) -> Iterator[tuple[str, Matrix]]:
+        """Yield the name and the transform of each copy of an object at a transform."""
+        matrices = np.repeat(world[None], len(self.offsets), axis=0)
+        matrices[:, :3, 3] += self.offsets
+        if self.turns is not None:
+            matrices[:, :3, :3] = self.turns @ world[:3, :3]
+        return ((f"{name}.{number}", matrix) for number, matrix in enumerate(matrices))
+
+    def lights(self, light: Light) -> list[Light]:
+        """Return the copies of a light."""
+        n = len(self.offsets)
+        positions: Sequence[Any] = _tuples(np.array(light.position) + self.offsets)
+        directions: Sequence[Any] = [light.direction] * n
+        if self.turns is not None:
+            directions = _tuples(unit(self.turns @ np.array(light.direction)))
+        colors, intensities = ([*self.values.get(key, n * [getattr(light, key)])] for key in ("color", "intensity"))
+        if "color" in self.factors:
+            colors = _tuples(np.array(colors) * self.factors["color"])
+        if "intensity" in self.factors:
+            intensities = (np.array(intensities) * self.factors["intensity"][:, 0]).tolist()
+        ranges = self.values.get("range", n * [light.range])
+        rest = light.inner, light.outer, light.casts_shadow
+        rows = zip(positions, directions, colors, intensities, ranges, strict=True)
+        return [Light(f"{light.name}.{number}", light.type, *row, *rest) for number, row in enumerate(rows)]
+
+
+def count_of(values: Mapping[str, Any]) -> int:
+    """Return the number of copies that `repeat` asks for; 0 for a file, which has not been read."""
+    if "grid" in values:
+        return math.prod(values["grid"])
+    return int(next((values[key] for key in ("line", "ring", "scatter") if key in values), 0))
+
+
+def copies(values: Mapping[str, Any], columns: Mapping[str, Doubles]) -> Copies:
+    """Return the copies that `repeat` describes.
+
+    Args:
+        values: the keys of `repeat`.
+        columns: of its file, by key, (n, 1) or (n, 3); see `read_columns`.
+
+    Raises:
+        ValueError: keys contradict each other.
+    """
+    offsets, turns = _layout(values, columns)
+    n, vary, seed = len(offsets), values.get("vary", {}), values.get("seed", 0)
+    if "at" in vary:
+        offsets = offsets + _random(seed, "at", (n, 3), signed=True) * vary["at"]
+    if "rotate_degrees" in vary:
+        angles = _random(seed, "rotate_degrees", (n, 3), signed=True) * vary["rotate_degrees"]
+        turns = turns @ _rotations(angles)
+    if "scale" in vary:
+        turns = turns * (1 + vary["scale"] * _random(seed, "scale", (n, 1, 1), signed=True))
+    found = {key: array[:, 0].tolist() if array.shape[1] == 1 else _tuples(array) for key, array in columns.items()}
+    kept: dict[str, Sequence[Any]] = {key: found[key] for key in ("color", "intensity", "range") if key in found}
+    choose = dict(values.get("choose", {}))
+    order = choose.pop("order", "random")
+    picks = np.arange(n) if order == "turn" else _random(seed, "choose", (n,))
+    for key, choices in choose.items():
+        index = picks % len(choices) if order == "turn" else (picks * len(choices)).astype(int)
+        kept[key] = [choices[number] for number in index.tolist()]
+    widths = {"color": 3, "intensity": 1}
+    factors = {
+        key: 1 + vary[key] * _random(seed, key, (n, width), signed=True) for key, width in widths.items() if key in vary
+    }
+    is_turned = bool((turns != np.eye(3)).any())
+    return Copies(offsets, turns if is_turned else None, kept, factors)
+
+
+def _layout(values: Mapping[str, Any], columns: Mapping[str, Doubles]) -> tuple[Doubles, Doubles]:
+    """Offsets (n, 3) and turns (n, 3, 3) without random changes."""
+    if "grid" in values:
+        nx, ny, nz = values["grid"]
+        number = np.arange(nx * ny * nz)
+        cell = np.stack([number % nx, number // nx % ny, number // (nx * ny)], axis=-1).astype(np.float64)
+        if values.get("centered", False):
+            cell -= (np.array([nx, ny, nz]) - 1) / 2
+        return cell * values.get("step", (1.0, 1.0, 1.0)), _identities(len(cell))
+    if "line" in values:
+        n = values["line"]
+        return np.arange(n)[:, None] * np.array(values.get("step", (1.0, 0.0, 0.0))), _identities(n)
+    if "ring" in values:
+        n, arc = values["ring"], values.get("arc_degrees", 360.0)
+        angles = values.get("start_degrees", 0.0) + np.linspace(0, arc, n, endpoint=abs(arc) < 360)
+        radians = np.radians(angles)
+        offsets = np.stack([np.cos(radians), np.zeros(n), -np.sin(radians)], axis=-1) * values.get("radius", 1.0)
+        about_y = np.stack([np.zeros(n), angles, np.zeros(n)], axis=-1)
+        return offsets, _rotations(about_y) if values.get("turned", False) else _identities(n)
+    if "scatter" in values:
+        n = values["scatter"]
+        spread = _random(values.get("seed", 0), "at", (n, 3), purpose=1) - 0.5
+        return spread * values.get("size", (1.0, 1.0, 1.0)), _identities(n)
+    n = len(next(iter(columns.values())))
+    turns = _rotations(columns["rotate_degrees"]) if "rotate_degrees" in columns else _identities(n)
+    return columns.get("at", np.zeros((n, 3))), turns * columns["scale"][:, :, None] if "scale" in columns else turns
+
+
+def _identities(count: int) -> Doubles:
+    return np.repeat(np.eye(3)[None], count, axis=0)
+
+
+def _rotations(degrees: Doubles) -> Doubles:
+    """`geometry.euler_matrix` of each row, (n, 3, 3)."""
+    (cx, cy, cz), (sx, sy, sz) = np.cos(np.radians(degrees.T)), np.sin(np.radians(degrees.T))
+    rows = [
+        [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
+        [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
+        [-sy, cy * sx, cy * cx],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def _tuples(array: Doubles) -> list[Any]:
+    return list(map(tuple, array.tolist()))
+
+
+def _random(seed: int, key: str, shape: tuple[int, ...], *, purpose: int = 0, signed: bool = False) -> Doubles:
+    """Random numbers from 0 to 1, or -1 to 1; from raw bits, which are the same with every version of NumPy."""
+    from numpy.random import PCG64  # few scenes need it
+
+    bits = PCG64([seed, _RANDOM.index(key), purpose]).random_raw(math.prod(shape))
+    numbers: Doubles = (bits >> 11).reshape(shape) * np.float64(2.0**-53)
+    return 2 * numbers - 1 if signed else numbers
+
+
+# Files ----------------------------------------------------------------------------------------------------------------
+
+
+def read_columns(data: bytes, ending: str, section: str, most: int, most_bytes: int) -> dict[str, Doubles]:
+    """Return what a file says of each copy: by key of `COLUMNS`, finite numbers (n, 1) or (n, 3).
+
+    Args:
+        ending: `.csv`: a header and a row for each copy; `.npz`: an array for each key; `.json`: a mapping of those.
+        section: `objects` or `lights`.
+        most: limit of copies.
+        most_bytes: limit of what a compressed file unpacks to.
+
+    Raises:
+        ValueError: the file is broken, or has something else in it.
+    """
+    if ending == ".csv":
+        given = _csv_columns(data, section, most)
+    elif ending == ".json":
+        try:
+            given = msgspec.json.decode(data, type=dict[str, Any])
+        except (msgspec.DecodeError, RecursionError) as error:
+            raise ValueError(f"is not a mapping of keys to lists: {error}") from None
+    elif ending == ".npz":
+        given = _arrays(data, most_bytes)
+    else:
+        raise ValueError("is no table of copies; use a file that ends in .csv, .json or .npz")
+    known = COLUMNS[section]
+    found = {}
+    for key, values in given.items():
+        if key not in known:
+            raise ValueError(f"has '{key}', which {section} do not take{suggestion(key, known, most=len(known))}")
+        found[key] = _column(key, values, known[key])
+    lengths = {len(array) for array in found.values()}
+    if len(lengths) != 1 or 0 in lengths:
+        counts = ", ".join(f"{len(array)} for '{key}'" for key, array in found.items())
+        raise ValueError(f"has different numbers of rows: {counts}" if len(lengths) > 1 else "has no rows")
+    return found
+
+
+def _column(key: str, values: object, width: int) -> Doubles:
+    try:
+        array = np.asarray(values, np.float64)
+    except (ValueError, TypeError):
+        raise ValueError(f"has '{key}' that is not a list of numbers of equal length") from None
+    array = array[:, None] if array.ndim == 1 and width == 1 else array
+    if array.ndim != 2 or array.shape[1] != width:
+        raise ValueError(f"has '{key}' of the shape {array.shape}, not {'(n, 3)' if width == 3 else '(n,)'}")
+    low = 0.0 if key in ("color", "intensity", "range") else -FARTHEST
+    wrong = ~((array >= low) & (array <= FARTHEST)).all(axis=1)
+    if key == "range":
+        wrong |= array[:, 0] == 0
+    if wrong.any():
+        row = int(wrong.argmax())
+        limits = "above 0" if key == "range" else "at least 0" if low == 0 else "finite"
+        raise ValueError(f"has '{key}' {array[row].tolist()} in row {row + 1}; it must be {limits}")
+    return array
+
+
+def _csv_columns(data: bytes, section: str, most: int) -> dict[str, Any]:
+    rows = csv.reader(io.StringIO(data.decode("utf-8-sig", "replace")))
+    try:
+        header = [name.strip() for name in next(rows, [])]
+        columns = {name: target for name, target in _CSV.items() if target[0] in COLUMNS[section]}
+        for name in header:
+            if name not in columns:
+                raise ValueError(f"has the column '{name}'{suggestion(name, columns, most=len(columns))}")
+        if len({*header}) < len(header):
+            raise ValueError("has a column twice")
+        numbers: list[list[float]] = []
+        for row in rows:
+            if not row:
+                continue
+            if len(row) != len(header) or len(numbers) >= most:
+                problem = f"{len(row)} values, not {len(header)}" if len(row) != len(header) else "too many rows"
+                raise ValueError(f"has {problem} in line {rows.line_num}")
+            try:
+                numbers.append([float(value) for value in row])
+            except ValueError:
+                raise ValueError(f"has text in place of a number in line {rows.line_num}") from None
+    except csv.Error as error:
+        raise ValueError(f"is broken: {error}") from None
+    array = np.array(numbers, np.float64).reshape(len(numbers), len(header))
+    found: dict[str, Any] = {}
+    for key in dict.fromkeys(columns[name][0] for name in header):
+        width = COLUMNS[section][key]
+        default = 1.0 if key == "color" else 0.0
+        found[key] = np.full((len(array), width), default)
+        for name in header:
+            if columns[name][0] == key:
+                found[key][:, columns[name][1]] = array[:, header.index(name)]
+    return found
+
+
+def _arrays(data: bytes, most_bytes: int) -> dict[str, Any]:
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            unpacked = sum(entry.file_size for entry in archive.infolist())
+        if unpacked <= most_bytes:
+            with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+                return {str(key): arrays[key] for key in arrays.files}
+    except (
+        ValueError,
+        OSError,
+        EOFError,
+        KeyError,
+        zipfile.BadZipFile,
+        zlib.error,
+        RuntimeError,
+        MemoryError,
+    ) as error:
+        raise ValueError(f"is not a file of NumPy arrays: {error}") from None
+    raise ValueError(f"unpacks to {unpacked:,} bytes, more than {most_bytes:,}")
