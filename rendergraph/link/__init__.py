@@ -58,9 +58,7 @@ def sketch(
     try:
         return link(spec, catalog, lights, environment=environment), ()
     except InputError as error:
-        linker = _Linker(
-            spec, spec.catalog or catalog, tuple(lights), None, environment, SceneDataFacts, sketching=True
-        )
+        linker = _Linker(spec, spec.catalog or catalog, tuple(lights), None, environment, sketching=True)
         graph = linker.graph()
         lacking = {*linker.missing, *(problem for problem in spec.problems if problem.code == "RG130")}
         if any(problem not in lacking for problem in error.problems):
@@ -133,7 +131,7 @@ class _Linker(Struct, eq=False):
     lights: tuple[LightFacts, ...]
     objects: tuple[ObjectFacts, ...] | None
     environment: TextureDesc | None
-    scene_data: Callable[[], SceneDataFacts]
+    scene_data: Callable[[], SceneDataFacts] = SceneDataFacts
     sketching: bool = False
     missing: list[Problem] = []
     problems: list[Problem] = []
