@@ -7,6 +7,7 @@ objects must be told apart depends on what the step's shader looks at: a depth p
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -44,15 +45,39 @@ class MultiDraw(Struct, eq=False):
     textures: Mapping[str, tuple[int, int]]
     cull: str
     clockwise: bool
-    list: DrawList
+    list: DrawList | None
     mode: int
 
     def call(self, vertex_array: Any) -> Call:
         drawn, mode = self.list, self.mode
+        assert drawn is not None
 
         def call() -> None:
             if len(drawn.drawn):
                 vertex_array.render_indirect(drawn.buffer, mode, len(drawn.drawn))
+
+        return call
+
+
+class CommandDraw(MultiDraw, eq=False):
+    """Objects drawn by commands that a shader writes, one for each object of the scene.
+
+    Attributes:
+        buffer: the commands.
+        runs: the first object and the number of those next to each other that are drawn together.
+    """
+
+    buffer: moderngl.Buffer
+    runs: tuple[tuple[int, int], ...]
+
+    def call(self, vertex_array: Any) -> Call:
+        calls = [partial(vertex_array.render_indirect, self.buffer, self.mode, n, first) for first, n in self.runs]
+        if len(calls) == 1:
+            return calls[0]
+
+        def call() -> None:
+            for each in calls:
+                each()
 
         return call
 
@@ -81,6 +106,21 @@ class GeometryCompiler(Struct, eq=False):
             else:
                 runs.append((key, [index]))
         return [make(self._multi_draw(step, key, members)) for key, members in runs]
+
+    def by_commands(self, step: Step, buffer: moderngl.Buffer, make: Callable[[MultiDraw], Draw]) -> list[Draw]:
+        """Draws by the commands in a buffer, which the step itself decides nothing about."""
+        groups: dict[MultiDrawKey, list[int]] = {}
+        for index in select(self.scene.scene, step):
+            groups.setdefault(self._key(step, index), []).append(index)
+        mode, draws = self.scene.indices(step.topology).mode, []
+        for key, members in groups.items():
+            like = self._with_textures(key, None, mode)
+            ordered = sorted(members)
+            starts = [at for at, n in enumerate(ordered) if at == 0 or ordered[at - 1] != n - 1]
+            runs = tuple((ordered[a], b - a) for a, b in pairwise([*starts, len(ordered)]))
+            state = like.defines, like.textures, like.cull, like.clockwise
+            draws.append(make(CommandDraw(*state, None, mode, buffer, runs)))
+        return draws
 
     def _grouped(self, step: Step, objects: list[int]) -> list[MultiDraw]:
         state = step.state.cull, step.state.front
@@ -118,7 +158,7 @@ class GeometryCompiler(Struct, eq=False):
     def _multi_draw(self, step: Step, key: MultiDrawKey, members: list[int]) -> MultiDraw:
         return self._with_textures(key, self._list(step, members), self.scene.indices(step.topology).mode)
 
-    def _with_textures(self, key: MultiDrawKey, drawn: DrawList, mode: int) -> MultiDraw:
+    def _with_textures(self, key: MultiDrawKey, drawn: DrawList | None, mode: int) -> MultiDraw:
         self.scene.load_images([texture for _, texture in key.textures])
         found = {name: self.scene.texture(texture) for name, texture in key.textures}
         return MultiDraw(dict(key.defines), found, key.cull, key.clockwise, drawn, mode)

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 import moderngl
+import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
@@ -28,6 +29,7 @@ from rendergraph.gl import state as gl_state
 from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.gl.queries import OcclusionQuery, Timer
+from rendergraph.gl.raw import RawGL
 from rendergraph.gl.textures import Clear, poison_value
 from rendergraph.program import StepTexts, Texts, check_kept_text, declared_blocks, positions_macro
 from rendergraph.program.limits import check_plan, groups_of
@@ -45,6 +47,8 @@ _TOPOLOGY = {
     "triangles_adjacency": moderngl.TRIANGLES_ADJACENCY,
 }
 _ALL_BARRIERS = 0xFFFFFFFF
+_DRAW_INDIRECT_BUFFER, _PARAMETER_BUFFER, _UNSIGNED_INT = 0x8F3F, 0x80EE, 0x1405
+_COMMAND_BYTES = 20  # of a draw command, with a last integer that is ignored without indices
 _TEXTURE_2D, _DEPTH_BOUNDS_TEST, _CLIP_DISTANCE0 = 0x0DE1, 0x8890, 0x3000
 
 
@@ -77,6 +81,33 @@ def compile_plan(
         memory.release()
         buffers.release()
         raise
+
+
+class CountedDraw(Struct, eq=False):
+    """Draws as many of a step's commands as a buffer says (`GL_ARB_indirect_parameters`)."""
+
+    raw: RawGL
+    program: int
+    vertex_array: int
+    commands: int
+    count: int
+    mode: int
+    step: Step
+
+    def __call__(self) -> None:
+        raw, step = self.raw, self.step
+        raw.glUseProgram(self.program)
+        raw.glBindVertexArray(self.vertex_array)
+        raw.glBindBuffer(_DRAW_INDIRECT_BUFFER, self.commands)
+        raw.glBindBuffer(_PARAMETER_BUFFER, self.count)
+        if step.indices:
+            raw.glMultiDrawElementsIndirectCountARB(
+                self.mode, _UNSIGNED_INT, _COMMAND_BYTES * step.command, 0, step.commands, _COMMAND_BYTES
+            )
+        else:
+            first = _COMMAND_BYTES * step.command
+            raw.glMultiDrawArraysIndirectCountARB(self.mode, first, 0, step.commands, _COMMAND_BYTES)
+        raw.glBindBuffer(_PARAMETER_BUFFER, 0)
 
 
 class _Compiler(Struct, eq=False, dict=True):
@@ -225,8 +256,17 @@ class _Compiler(Struct, eq=False, dict=True):
         vertex_array = self.programs.vertex_array(program, key, content, index)
         mode = _TOPOLOGY[step.topology]
         if isinstance(step.vertices, str):
-            indirect, source = vertex_array.render_indirect, self.memory.buffer(step.vertices, parity)
-            call: Call = partial(indirect, source, mode, step.commands, first=step.command)
+            source = self.memory.buffer(step.vertices, parity)
+            call: Call = partial(vertex_array.render_indirect, source, mode, step.commands, first=step.command)
+            if step.count and self.device.limits["counted_draws"]:
+                count = self.memory.buffer(step.count, parity)
+                call = CountedDraw(self.device.raw, program.glo, vertex_array.glo, source.glo, count.glo, mode, step)
+        elif isinstance(step.instances, str):
+            command = self.device.ctx.buffer(np.array([step.vertices, 1, 0, 0, 0], np.uint32).tobytes())
+            self.geometry.buffers.append(command)
+            number = self.memory.buffer(step.instances, parity)
+            compiled.before.append(partial(self.device.ctx.copy_buffer, command, number, 4, write_offset=4))
+            call = partial(vertex_array.render_indirect, command, mode, 1)
         else:
             call = partial(vertex_array.render, mode, step.vertices, 0, step.instances)
         compiled.draws.append(Draw(program, uniforms, self._state(step, depth_default=True), call, binds))
@@ -251,7 +291,11 @@ class _Compiler(Struct, eq=False, dict=True):
         turns = any(use.use == "buffer" and len(self.plan.placement[use.resource]) == 2 for use in uses)
         key = (*step.key, parity if turns else 0)
         if key not in self._geometry_draws:  # one set of command buffers for both parities, unless buffers differ
-            self._geometry_draws[key] = self.geometry.draws(step, make)
+            if step.object_commands:
+                buffer = self.memory.buffer(step.object_commands, parity)
+                self._geometry_draws[key] = self.geometry.by_commands(step, buffer, make)
+            else:
+                self._geometry_draws[key] = self.geometry.draws(step, make)
         made = self._geometry_draws[key]
         if isinstance(made, SortedDraws):
             compiled.sorted = made

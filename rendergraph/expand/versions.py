@@ -13,12 +13,23 @@ from rendergraph.expand.model import CAMERA, OF_SCENE, VersionedSteps, ViewTable
 from rendergraph.expand.recording import Recording, is_kept
 from rendergraph.expand.targets import overlap, parts_written, refusals, target_size
 from rendergraph.link import Endpoint, Graph
-from rendergraph.steps import FunctionBinding, Read, Resource, Role, Step, StepRequest, Use, Where, Write
+from rendergraph.steps import (
+    BUFFER_OPTIONS,
+    FunctionBinding,
+    Read,
+    Resource,
+    Role,
+    Step,
+    StepRequest,
+    Use,
+    Where,
+    Write,
+)
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
 
 _COPIED_OPTIONS = frozenset(
     """
-    label state region objects materials order in_place per_light topology command commands instances invocations
+    label state region objects materials order in_place per_light topology command commands invocations
     """.split()  # noqa: SIM905 - a list of so many words reads best as text
 )
 """Options of a request that a step has as they are."""
@@ -164,7 +175,7 @@ class _VersionAssignment:
         view, view_index = self._view(recording, request, options)
         self._carry_view(writes, view if request.kind == "geometry" else None)
         size, samples = target_size(self.resources, writes, reads)
-        counts = {name: options[name] for name in ("vertices", "indices", "groups") if options.get(name) is not None}
+        counts = {name: options[name] for name in BUFFER_OPTIONS if options.get(name) is not None}
         for name, port in counts.items():
             if isinstance(port, Port):
                 reads += self._reads(recording, port.name, port.whole)

@@ -243,5 +243,6 @@ def _wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
         **{f"groups_{axis}": raw.integer(0x91BE, number) for number, axis in enumerate("xyz")},
     }
     limits["depth_bounds"] = int("GL_EXT_depth_bounds_test" in ctx.extensions)
+    limits["counted_draws"] = int("GL_ARB_indirect_parameters" in ctx.extensions)
     raw.error()  # from limits that this driver does not know
     return Device(ctx, raw, owned, limits)

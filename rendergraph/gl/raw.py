@@ -61,6 +61,8 @@ _FUNCTIONS = {
     "vuiuii": "glTextureStorage2D",
     "vuuuii": "glNamedFramebufferTextureLayer",
     "vuuuss": "glBindBufferRange",
+    "vussii": "glMultiDrawArraysIndirectCountARB",
+    "vuussii": "glMultiDrawElementsIndirectCountARB",
     "vuuuup": "glClearNamedBufferData",
     "vuuuuu": "glBlendFuncSeparatei",
     "vuiuiib": "glTextureStorage2DMultisample",

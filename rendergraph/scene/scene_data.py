@@ -26,9 +26,9 @@ FLAGS = {name: 1 << bit for bit, name in enumerate(_FLAGS)}
 INSTANCE_DATA = np.dtype(
     [("rows", "<f4", (3, 4))]
     + [(name, "<i4") for name in ("material", "mesh", "flags", "first_index", "base_vertex", "triangles")]
-    + [("first_emitter", "<i4"), ("padding", "<i4")]
+    + [("first_emitter", "<i4"), ("padding", "<i4"), ("box_center", "<f4", 4), ("box_extent", "<f4", 4)]
 )
-"""`SceneInstance`: rows of the affine object-to-world matrix, indices, flags, and where its geometry lies."""
+"""`SceneInstance`: rows of the affine object-to-world matrix, indices, flags, where its geometry lies, and its box."""
 EMITTER = np.dtype([("instance", "<i4"), ("triangle", "<i4")])
 
 _OPTIONAL = {"tangents": 4, "uv0": 2, "uv1": 2, "colors": 4}
@@ -91,6 +91,7 @@ def instance_data(scene: Scene, packed: PackedScene) -> Records:
     for name in ("first_index", "base_vertex"):
         records[name] = meshes[name]
     records["triangles"] = meshes["count"] // 3
+    records["box_center"][:, :3], records["box_extent"][:, :3] = packed.centers, packed.extents + packed.slack
     records["first_emitter"] = -1
     emitting = emitting_objects(scene)
     counts = records["triangles"][emitting]

@@ -21,6 +21,7 @@ from rendergraph.steps.model import Upload as Upload
 from rendergraph.steps.model import Use as Use
 from rendergraph.steps.model import Where as Where
 from rendergraph.steps.model import Write as Write
+from rendergraph.steps.recorder import BUFFER_OPTIONS as BUFFER_OPTIONS
 from rendergraph.steps.recorder import Recorder as Recorder
 from rendergraph.steps.recorder import StepRequest as StepRequest
 from rendergraph.steps.recorder import Steps as Steps

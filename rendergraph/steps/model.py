@@ -133,6 +133,9 @@ class Step(Struct, frozen=True, gc=False):
         per_light: a light's index if the step draws for one light alone.
         vertices: vertex count of a `draw` step, or the name of the buffer that holds the indirect command.
         command, commands: the first of the commands of that buffer, and their number; of `groups` likewise.
+        count: the name of the buffer that holds how many of the commands are drawn; empty for all.
+        instances: their number, or the name of the buffer that holds it.
+        object_commands: the name of the buffer with a command for each object, of a geometry step; empty without any.
         indices: the name of the buffer that holds the indices; empty without any.
         topology: primitives of a `draw` step; `triangles` or `triangles_adjacency` of a geometry step.
         attributes: for a `draw` step, buffer resource to attribute names with formats (`3f in_position`).
@@ -168,9 +171,11 @@ class Step(Struct, frozen=True, gc=False):
     vertices: int | str = 3
     command: int = 0
     commands: int = 1
+    count: str = ""
+    object_commands: str = ""
     indices: str = ""
     topology: Topology = "triangles"
-    instances: int = 1
+    instances: int | str = 1
     attributes: tuple[tuple[str, str], ...] = ()
     groups: tuple[int, int, int] | str = (1, 1, 1)
     invocations: tuple[int, int, int] | None = None

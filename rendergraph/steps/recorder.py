@@ -75,8 +75,9 @@ class StepRequest(Struct, frozen=True, gc=False):
                 yield self.options[name]
 
 
-BUFFER_OPTIONS = ("vertices", "indices", "groups")
+BUFFER_OPTIONS = ("vertices", "indices", "groups", "instances", "count", "object_commands")
 """Options of a step that may name a buffer."""
+_COMMAND_BYTES = 20  # of a draw command
 Target: TypeAlias = Port | Part
 Defines: TypeAlias = Annotated[Mapping[str, Macro], "a mapping from macros to values"]
 IN_PLACE = ("<geometry.vert>", "<depth.vert>")
@@ -203,6 +204,7 @@ class Steps:
         in_place: bool | None = None,
         per_light: Count | None = None,
         topology: Literal["triangles", "triangles_adjacency"] = "triangles",
+        commands: Port | None = None,
         **bindings: Target | UniformValue | None,
     ) -> None:
         """Draw the scene's objects, with one indirect multi-draw per batch.
@@ -224,7 +226,16 @@ class Steps:
             topology: `triangles_adjacency` gives a geometry shader six vertices per triangle: after each corner the
                 vertex across the edge to the next one; vertices with equal positions count as one. The objects must be
                 `closed`.
+            commands: a buffer port with a draw command for every object of the scene, in its order, which an earlier
+                step has written: `DrawCommand` of `#include <scene.glsl>`. The step draws those of its `objects` whose
+                command has an instance, in the scene's order. The view culls none of them; the shader that writes the
+                commands decides.
         """
+        if commands is not None:
+            if order == "back_to_front" or topology == "triangles_adjacency":
+                wrong = "order='back_to_front'" if order == "back_to_front" else "topology='triangles_adjacency'"
+                raise Misuse(f"both commands and {wrong} are given; commands draw triangles in the scene's order")
+            self._check_buffer("commands", commands, _COMMAND_BYTES * len(self.facts.objects))
         if per_light is not None and per_light >= len(self.lights):
             raise Misuse(f"per_light is {per_light}, but the scene has {len(self.lights)} lights, counted from 0")
         shaders = {"vertex": vertex, "geometry": geometry, "fragment": fragment}
@@ -233,7 +244,7 @@ class Steps:
         target = {"label": label, "state": state, "region": region, "if_drawn": if_drawn}
         camera = {"view": view, "view_index": view_index, "in_place": in_place}
         selection = {"objects": checks.objects(objects), "materials": materials, "order": order, "per_light": per_light}
-        options = target | camera | selection | {"topology": topology}
+        options = target | camera | selection | {"topology": topology, "object_commands": commands}
         self._add("geometry", shaders, out, bindings, defines, **options)
 
     @checked
@@ -245,11 +256,12 @@ class Steps:
         vertices: Count | Port,
         command: Count = 0,
         commands: Positive = 1,
+        count: Port | None = None,
         indices: Port | None = None,
         attributes: Mapping[str, Port] | None = None,
         geometry: Shader | None = None,
         topology: Topology = "triangles",
-        instances: Count = 1,
+        instances: Count | Port = 1,
         out: Target | Mapping[str, Target] | None = None,
         state: State = State(),
         region: Count | None = None,
@@ -268,10 +280,13 @@ class Steps:
                 vertex, base instance).
             command, commands: the first of those commands, from 0, and their number. An earlier step may write fewer:
                 a command that is all 0 draws nothing.
+            count: a buffer port whose first 32-bit integer is how many of the `commands` are drawn. Those beyond it
+                must be all 0: a driver without `GL_ARB_indirect_parameters` draws them, too.
             indices: a buffer port of 32-bit indices.
             attributes: layout to buffer port, the layout as `3f 2f in_position in_uv`; with `/i` after the formats
                 (`4f/i in_color`) they advance per instance.
-            topology, instances: as in OpenGL.
+            topology: as in OpenGL.
+            instances: a number, or a buffer port whose first 32-bit integer is the number.
             out, state, region, defines, label, bindings: see the class.
             view, view_index: as for `geometry`.
         """
@@ -279,6 +294,17 @@ class Steps:
             self._check_buffer("vertices", vertices, 20 * (command + commands) - (4 if indices is None else 0))
         else:
             checks.check_argument("vertices", vertices, Count)
+        is_indirect = isinstance(vertices, Port | Part)
+        if count is not None:
+            if not is_indirect:
+                raise Misuse("count is given without commands; give vertices=BUFFER, or instances=BUFFER")
+            self._check_buffer("count", count, 4)
+        if isinstance(instances, Port | Part):
+            if is_indirect:
+                raise Misuse("both vertices and instances are buffers; a command holds its number of instances")
+            self._check_buffer("instances", instances, 4)
+        else:
+            checks.check_argument("instances", instances, Count)
         if indices is not None:
             self._check_buffer("indices", indices)
         buffers = checks.attributes(self.ports, attributes)
@@ -286,7 +312,7 @@ class Steps:
             self._connected(port)
         shaders = {"vertex": vertex, "geometry": geometry, "fragment": fragment}
         target = {"label": label, "state": state, "region": region, "view": view, "view_index": view_index}
-        source = {"vertices": vertices, "command": command, "commands": commands, "indices": indices}
+        source = {"vertices": vertices, "command": command, "commands": commands, "indices": indices, "count": count}
         shape = {"topology": topology, "instances": instances, "attributes": buffers}
         self._add("draw", shaders, out, bindings, defines, **target, **source, **shape)
 

@@ -33,6 +33,17 @@ struct SceneInstance {
     int triangles;
     int first_emitter;  // the number of its triangle 0 in `scene_emitters`; -1 if it emits no light
     int padding;
+    vec4 box_center;    // xyz: middle of its world-space bounding box
+    vec4 box_extent;    // xyz: half of the box's sides
+};
+
+// What a geometry step draws of one object, for its `commands`.
+struct DrawCommand {
+    uint count;
+    uint instances;
+    uint first_index;
+    int base_vertex;
+    uint base_instance;
 };
 
 // A triangle that emits light, in this frame or another. Those of an instance follow each other in their own order.
@@ -56,6 +67,12 @@ layout(std430) readonly buffer scene_emitter_block {
 
 bool scene_has(int instance, int flag) {
     return (scene_instances[instance].flags & flag) != 0;
+}
+
+// The command that draws an instance, or nothing.
+DrawCommand scene_draw_command(int instance, bool is_drawn) {
+    SceneInstance i = scene_instances[instance];
+    return DrawCommand(uint(3 * i.triangles), is_drawn ? 1u : 0u, uint(i.first_index), i.base_vertex, uint(instance));
 }
 
 // The numbers of a triangle's vertices in `scene_vertices`.
