@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable
 from itertools import pairwise
 from typing import Any
 
@@ -25,7 +25,7 @@ from rendergraph.program.variants import FIXED_BLOCKS, light_macros, scene_macro
 from rendergraph.scene import pack
 from rendergraph.scene.model import ImageSource, MadeImage, Scene, Texture, changed_objects
 from rendergraph.scene.pack import PackedScene, Records
-from rendergraph.scene.scene_data import data_macros, instance_data
+from rendergraph.scene.scene_data import data_macros, instance_data, used_textures
 from rendergraph.textures import TextureDesc, full_mip_count
 
 Decode = Callable[[ImageSource, bool], npt.NDArray[Any]]
@@ -82,6 +82,7 @@ class GpuScene(Struct, eq=False, dict=True):
     _streams: dict[str, tuple[moderngl.Buffer, str]] = {}
     _constants: dict[str, moderngl.Buffer] = {}
     _images: dict[tuple[ImageSource, bool], GpuTexture] = {}
+    _sampled: set[tuple[ImageSource, bool]] = set()
     _samplers: dict[tuple[str, ...], int] = {}
     _blocks: dict[str, tuple[moderngl.Buffer, bool]] = {}
     _environment: GpuTexture | None = None
@@ -155,16 +156,24 @@ class GpuScene(Struct, eq=False, dict=True):
         self._stale_instances.clear()
 
     @property
-    def data(self) -> Mapping[str, moderngl.Buffer]:
-        """The buffers of the scene's data by the names of their blocks, uploaded when somebody first asks."""
+    def data(self) -> SceneBuffers:
+        """The scene's data, uploaded when somebody first asks."""
         if self._data is None:
-            self._data = SceneBuffers.make(self.device, self.scene, self.packed)
-        return self._data.buffers
+            used = used_textures(self.scene)
+            self.load_images(list(used.values()))
+            images = {key: self._images[texture.image, texture.srgb] for key, texture in used.items()}
+            self._data = SceneBuffers.make(self.device, self.scene, self.packed, images)
+        return self._data
 
     @property
     def data_defines(self) -> dict[str, str]:
         """Macros for steps that read the scene's data."""
-        return {**self.defines, **data_macros(self.scene, self.packed)}
+        return {**self.defines, **data_macros(self.scene, self.packed, self.data.arrays)}
+
+    def drop_unused_images(self) -> None:
+        """Free the images that only the arrays of the scene's data were made of; asked after compiling."""
+        for key in self._images.keys() - self._sampled:
+            textures.delete(self.device, self._images.pop(key))
 
     def indices(self, topology: str) -> MeshIndices:
         """The indices of `triangles`, or of `triangles_adjacency`, which are found when somebody first draws them."""
@@ -206,6 +215,7 @@ class GpuScene(Struct, eq=False, dict=True):
     def texture(self, texture: Texture) -> tuple[int, int]:
         """GL names of a material texture and its sampler."""
         image = self._images[texture.image, texture.srgb].glo
+        self._sampled.add((texture.image, texture.srgb))
         key = (texture.min_filter, texture.mag_filter, texture.wrap_s, texture.wrap_t)
         if key not in self._samplers:
             is_trilinear = texture.min_filter == "linear_mipmap_linear"
@@ -233,7 +243,7 @@ class GpuScene(Struct, eq=False, dict=True):
 
     def resource(self, id: str) -> GpuTexture | moderngl.Buffer:
         """What a plan's resource of the scene is: its environment, or one buffer that stands for all its data."""
-        return self.data["scene_instance_block"] if id == SCENE_DATA.port else self.environment()
+        return self.data.buffers["scene_instance_block"] if id == SCENE_DATA.port else self.environment()
 
     @property
     def environment_content(self) -> Hashable:

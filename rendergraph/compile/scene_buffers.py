@@ -1,41 +1,84 @@
-"""The buffers behind inputs of `SceneData`, made when a step first reads them and kept with the scene."""
+"""What is behind inputs of `SceneData`: buffers and texture arrays, made when a step first reads them."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
 
+from rendergraph.gl import textures
 from rendergraph.gl.device import Device
+from rendergraph.gl.textures import GpuTexture
 from rendergraph.scene import scene_data
 from rendergraph.scene.model import Scene
 from rendergraph.scene.pack import PackedScene, Records
+from rendergraph.scene.scene_data import BORDER, Stored, TextureArrays
+from rendergraph.textures import Sampler
+
+ARRAY = "scene_array_"
+"""The beginning of the arrays' names in `scene.glsl`."""
 
 
 class SceneBuffers(Struct, eq=False):
-    """Storage buffers by the names of their blocks in `scene.glsl`.
+    """The scene's data on the GPU.
 
     Attributes:
+        buffers: storage buffers by the names of their blocks in `scene.glsl`.
         instances: the records that the instance buffer holds.
+        arrays: where textures lie.
+        textures: texture arrays by their names in `scene.glsl`; they all have one `sampler`.
     """
 
+    device: Device
     buffers: dict[str, moderngl.Buffer]
     instances: Records
+    arrays: TextureArrays
+    textures: dict[str, GpuTexture]
+    sampler: int
 
     @classmethod
-    def make(cls, device: Device, scene: Scene, packed: PackedScene) -> SceneBuffers:
-        """Upload all buffers of a scene."""
+    def make(
+        cls, device: Device, scene: Scene, packed: PackedScene, images: Mapping[Stored, GpuTexture]
+    ) -> SceneBuffers:
+        """Upload all buffers of a scene, and copy its images, which have been uploaded, into arrays."""
         instances = scene_data.instance_data(scene, packed)
+        found = scene_data.texture_arrays({key: image.desc for key, image in images.items()})
+        sizes = {key: image.desc.size for key, image in images.items()}
         arrays: dict[str, npt.NDArray[np.generic]] = {
             "scene_vertex_block": scene_data.vertex_data(packed),
             "scene_index_block": packed.indices,
             "scene_instance_block": instances,
             "scene_emitter_block": scene_data.emitter_data(scene, packed),
+            "scene_texture_block": scene_data.texture_data(scene, sizes, found),
         }
         buffers = {name: device.ctx.buffer(array.tobytes() or bytes(128)) for name, array in arrays.items()}
-        return cls(buffers, instances)
+        made = {
+            f"{ARRAY}{number}": textures.create(device, desc, "an array of the scene's textures")
+            for number, desc in enumerate(found.arrays)
+        }
+        for key, (array, layer) in found.places.items():
+            _copy_with_border(device, images[key], made[f"{ARRAY}{array}"], layer, key)
+        return cls(device, buffers, instances, found, made, textures.create_sampler(device, Sampler("linear")))
 
     def release(self) -> None:
         for buffer in self.buffers.values():
             buffer.release()
+        for texture in self.textures.values():
+            textures.delete(self.device, texture)
+        self.device.raw.delete("glDeleteSamplers", self.sampler)
+
+
+def _copy_with_border(device: Device, image: GpuTexture, array: GpuTexture, layer: int, key: Stored) -> None:
+    """Copy an image into the corner of a layer, with the texels around it that its wrap modes mean."""
+    columns, rows = (
+        [(last if wrap == "repeat" else 0, 0, 1), (0, BORDER, last + 1), (0 if wrap == "repeat" else last, last + 2, 1)]
+        for wrap, last in zip(key[2:], (image.desc.width - 1, image.desc.height - 1), strict=True)
+    )
+    for x, to_x, width in columns:
+        for y, to_y, height in rows:
+            source = image.glo, image.target, 0, x, y, 0
+            target = array.glo, array.target, 0, to_x, to_y, layer
+            device.raw.glCopyImageSubData(*source, *target, width, height, 1)

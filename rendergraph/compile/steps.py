@@ -156,6 +156,7 @@ class _Compiler(Struct, eq=False, dict=True):
         made.timers = [Timer(self.device) for _ in self.plan.schedule.steps]
         made.occlusion_queries = list(self._queries.values())
         made.invalidate()
+        self.scene.drop_unused_images()
         activity.note("preparing a frame")()
         return made
 
@@ -354,7 +355,7 @@ class _Compiler(Struct, eq=False, dict=True):
         texts = self._texts(step, macros)
         if step.reads_scene:
             used = {name for text in texts().values() for _, name, _ in declared_blocks(text.text)}
-            held = dict(self.scene.data)
+            held = dict(self.scene.data.buffers)
             if "scene_previous_block" in used:
                 held["scene_previous_block"] = self.scene.previous()
                 self.uses_previous = True
@@ -375,6 +376,10 @@ class _Compiler(Struct, eq=False, dict=True):
             if before + read.name in program.uniforms:
                 names = tuple(self.memory.part(read.resource, p, read).glo for p in range(self.memory.parities))
                 uniforms[before + read.name] = self.units.unit(names, self.memory.sampler(read.sampler), binds)
+        for name, texture in self.scene.data.textures.items() if step.reads_scene else ():
+            sampled.add(name)
+            if name in program.uniforms:
+                uniforms[name] = self.units.unit((texture.glo,), self.scene.data.sampler, binds)
         cls, resources, sampled = self.types[step.node].cls, self.plan.resources, {*sampled, *materials}
         check_kept_text(step, texts, cls, resources)
         check_program(step, program, texts, resources, uniforms, blocks, sampled, cls)

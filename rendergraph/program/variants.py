@@ -12,7 +12,7 @@ from rendergraph.scene import pack
 from rendergraph.scene.facts import selected
 from rendergraph.scene.model import Material, Scene, Texture
 from rendergraph.scene.pack import PackedScene
-from rendergraph.scene.scene_data import data_macros
+from rendergraph.scene.scene_data import data_macros, expected_arrays
 from rendergraph.steps import Step
 
 FIXED_BLOCKS = {
@@ -41,7 +41,7 @@ def variants(
     if step.kind in ("geometry", "draw"):
         macros["PASS_VIEW_COUNT"] = view_count(step, views)
     if step.reads_scene:
-        macros |= scene_macros(scene, packed, stored) | data_macros(scene, packed)
+        macros |= scene_macros(scene, packed, stored) | data_macros(scene, packed, expected_arrays(scene))
     if step.kind != "geometry":
         return [macros]
     macros |= scene_macros(scene, packed, stored)

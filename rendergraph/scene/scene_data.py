@@ -6,15 +6,19 @@ the packed indices, which is that of `gl_PrimitiveID` in a geometry pass.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import reduce
+from itertools import combinations
 from operator import or_
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from rendergraph.facts import SceneDataFacts
-from rendergraph.scene.model import Scene
-from rendergraph.scene.pack import PackedScene, Records
+from rendergraph.scene.model import ImageSource, Scene, Texture
+from rendergraph.scene.pack import SLOTS, PackedScene, Records
+from rendergraph.textures import FORMATS, TextureDesc
 
 _FLAGS = (
     *("casts_shadow", "hidden", "double_sided", "masked", "blended", "mirrored", "unlit"),
@@ -34,6 +38,93 @@ EMITTER = np.dtype([("instance", "<i4"), ("triangle", "<i4")])
 _OPTIONAL = {"tangents": 4, "uv0": 2, "uv1": 2, "colors": 4}
 """Vertex streams that a scene may lack, behind positions and normals, with their widths."""
 
+MOST_ARRAYS = 6
+"""Texture arrays of a scene; with the other textures of a step they must fit into the 16 units of a stage."""
+BORDER = 1
+"""Texels around an image in its layer, which repeat it as its wrap modes say, so that filtering finds them there."""
+_WRAPS = ("repeat", "mirror", "clamp")
+_LIGHT_FILES = (".hdr", ".exr")
+
+Stored: TypeAlias = tuple[ImageSource, bool, str, str]
+"""An image in a layer of its own: the image, whether it is sRGB, and its wrap modes along s and t."""
+
+
+class TextureArrays(NamedTuple):
+    """The arrays that hold a scene's textures, and array and layer of each of them.
+
+    Textures of one format and size share an array. Where that makes more than `MOST_ARRAYS`, arrays of one format are
+    joined, those first for which that takes the fewest bytes: a smaller image then fills a corner of its layer.
+    """
+
+    arrays: tuple[TextureDesc, ...]
+    places: Mapping[Stored, tuple[int, int]]
+
+
+def stored(texture: Texture) -> Stored:
+    return texture.image, texture.srgb, texture.wrap_s, texture.wrap_t
+
+
+def used_textures(scene: Scene) -> dict[Stored, Texture]:
+    """Return what arrays hold: every texture of a material that some object has."""
+    used = sorted({placed.material for placed in scene.objects})
+    return {stored(texture): texture for number in used for texture in scene.materials[number].textures.values()}
+
+
+def expected_arrays(scene: Scene) -> TextureArrays:
+    """Return the arrays as far as files say what is in them, before anything is decoded.
+
+    Images of more than 8 bits a channel that are no HDR or EXR files, and those of plugins, may turn out otherwise.
+    """
+    descs = {}
+    for key, texture in used_textures(scene).items():
+        light = texture.image.path.suffix.lower() in _LIGHT_FILES
+        format_name = "rgba16f" if light else "srgb8_a8" if texture.srgb else "rgba8"
+        descs[key] = TextureDesc("texture2d", format_name, *(texture.image.size or (1, 1)))
+    return texture_arrays(descs)
+
+
+def texture_arrays(descs: Mapping[Stored, TextureDesc]) -> TextureArrays:
+    """Return arrays for images of these formats and sizes."""
+    groups: dict[tuple[str, int, int], list[Stored]] = {}
+    for key, desc in descs.items():
+        groups.setdefault((desc.format, desc.width, desc.height), []).append(key)
+    while len(groups) > MOST_ARRAYS:
+        pairs = [pair for pair in combinations(groups, 2) if pair[0][0] == pair[1][0]]
+        one, other = min(pairs, key=lambda pair: _added_bytes(pair, groups))
+        joined = groups.pop(one) + groups.pop(other)
+        groups.setdefault((one[0], max(one[1], other[1]), max(one[2], other[2])), []).extend(joined)
+    arrays = [
+        TextureDesc("texture2d_array", name, width + 2 * BORDER, height + 2 * BORDER, layers=len(keys))
+        for (name, width, height), keys in groups.items()
+    ]
+    places = {key: (a, layer) for a, keys in enumerate(groups.values()) for layer, key in enumerate(keys)}
+    return TextureArrays(tuple(arrays), places)
+
+
+def _added_bytes(pair: Sequence[tuple[str, int, int]], groups: Mapping[tuple[str, int, int], list[Stored]]) -> int:
+    """Return the bytes by which images take more room when two groups become one."""
+    (name, a, b), (_, c, d) = pair
+    one, other = (len(groups[each]) for each in pair)
+    return FORMATS[name].bytes * (max(a, c) * max(b, d) * (one + other) - a * b * one - c * d * other)
+
+
+def texture_data(scene: Scene, sizes: Mapping[Stored, tuple[int, int]], arrays: TextureArrays) -> npt.NDArray[np.int32]:
+    """Return int32 (m, 8, 4) for the slots of each material.
+
+    They are array (-1 without a texture), layer, `width | height << 16`, and bits: UV set, 2 for an unfiltered
+    texture, and from the third and fifth bit on the wrap mode along s and t, 0 to 2 for repeat, mirror and clamp.
+    """
+    table = np.full((len(scene.materials), len(SLOTS), 4), (-1, 0, 0, 0), np.int32)
+    for number, material in enumerate(scene.materials):
+        for slot, texture in material.textures.items():
+            key = stored(texture)
+            if key in arrays.places:
+                width, height = sizes[key]
+                bits = texture.uv | (texture.mag_filter == "nearest") << 1
+                bits |= _WRAPS.index(texture.wrap_s) << 2 | _WRAPS.index(texture.wrap_t) << 4
+                table[number, SLOTS.index(slot)] = (*arrays.places[key], width | height << 16, bits)
+    return table
+
 
 def scene_data_facts(scene: Scene) -> SceneDataFacts:
     """Return what inputs of `SceneData` bring along in this scene."""
@@ -41,11 +132,15 @@ def scene_data_facts(scene: Scene) -> SceneDataFacts:
     vertices = sum(len(mesh.positions) for mesh in scene.meshes)
     width = 6 + sum(size for name, size in _OPTIONAL.items() if any(getattr(m, name) is not None for m in scene.meshes))
     emitters = sum(len(scene.meshes[scene.objects[number].mesh].indices) for number in emitting_objects(scene))
+    textures = expected_arrays(scene)
     return SceneDataFacts(
         bytes=4 * width * vertices
         + 12 * corners
         + INSTANCE_DATA.itemsize * len(scene.objects)
-        + EMITTER.itemsize * emitters,
+        + EMITTER.itemsize * emitters
+        + 16 * len(SLOTS) * len(scene.materials) * bool(textures.arrays)
+        + sum(desc.bytes for desc in textures.arrays),
+        textures=textures.arrays,
         triangles=sum(len(scene.meshes[placed.mesh].indices) for placed in scene.objects),
         emitters=emitters,
     )
@@ -57,7 +152,7 @@ def emitting_objects(scene: Scene) -> list[int]:
     return [n for n, placed in enumerate(scene.objects) if emits[placed.material] and not placed.hidden]
 
 
-def data_macros(scene: Scene, packed: PackedScene) -> dict[str, str]:
+def data_macros(scene: Scene, packed: PackedScene, arrays: TextureArrays) -> dict[str, str]:
     """Return the macros of steps that read the scene's data."""
     facts = scene_data_facts(scene)
     macros = {
@@ -68,6 +163,12 @@ def data_macros(scene: Scene, packed: PackedScene) -> dict[str, str]:
         **{f"SCENE_{name.upper()}": str(bit) for name, bit in FLAGS.items()},
     }
     macros |= {f"SCENE_{name.upper()}_STREAM": "1" for name in _OPTIONAL if getattr(packed, name) is not None}
+    macros["SCENE_ARRAY_COUNT"] = str(len(arrays.arrays))
+    used = dict.fromkeys(SLOTS, 0)
+    for material in scene.materials:
+        for slot, texture in material.textures.items():
+            used[slot] |= 1 << arrays.places[stored(texture)][0] if stored(texture) in arrays.places else 0
+    macros |= {f"SCENE_{slot.upper()}_ARRAYS": str(bits) for slot, bits in used.items() if bits}
     if any(map(scene.has_grain, scene.materials)):
         macros["SCENE_GRAIN"] = "1"
     if packed.material_moved.any():

@@ -52,6 +52,30 @@ struct SceneEmitter {
     int triangle;
 };
 
+#if SCENE_ARRAY_COUNT > 0
+// Of each material its 8 slots: array (-1 without a texture), layer, width | height << 16, and bits: UV set, 2 without
+// filtering, 4 and 16 times the wrap mode along s and t (0 repeat, 1 mirror, 2 clamp).
+layout(std430) readonly buffer scene_texture_block {
+    ivec4 scene_textures[];
+};
+uniform sampler2DArray scene_array_0;
+#endif
+#if SCENE_ARRAY_COUNT > 1
+uniform sampler2DArray scene_array_1;
+#endif
+#if SCENE_ARRAY_COUNT > 2
+uniform sampler2DArray scene_array_2;
+#endif
+#if SCENE_ARRAY_COUNT > 3
+uniform sampler2DArray scene_array_3;
+#endif
+#if SCENE_ARRAY_COUNT > 4
+uniform sampler2DArray scene_array_4;
+#endif
+#if SCENE_ARRAY_COUNT > 5
+uniform sampler2DArray scene_array_5;
+#endif
+
 layout(std430) readonly buffer scene_vertex_block {
     SceneVertex scene_vertices[];
 };
@@ -179,12 +203,72 @@ vec3 scene_geometric_normal(int instance, int triangle) {
     return scene_has(instance, SCENE_MIRRORED) ? -normal : normal;
 }
 
+// The two sets of texture coordinates at a point.
+struct SceneCoordinates {
+    vec2 uv[2];
+};
+
+SceneCoordinates scene_coordinates(ivec3 v, vec3 w) {
+    SceneCoordinates c;
+    for (int set = 0; set < 2; ++set) {
+        c.uv[set] = scene_vertex_uv(v.x, set) * w.x + scene_vertex_uv(v.y, set) * w.y + scene_vertex_uv(v.z, set) * w.z;
+    }
+    return c;
+}
+
+#if SCENE_ARRAY_COUNT > 0
+float scene_wrapped(float u, int mode) {
+    float mirrored = 1.0 - abs(mod(u, 2.0) - 1.0);
+    return mode == 0 ? fract(u) : mode == 1 ? mirrored : clamp(u, 0.0, 1.0);
+}
+
+// The texel of a slot at level 0 as its sampler has it; false if the material or the mesh lacks it. `arrays` are the
+// arrays that textures of the slot lie in, a constant. The border of a layer holds what lies across the image's edges.
+bool scene_texel(int instance, int slot, int arrays, SceneCoordinates c, out vec4 texel) {
+    int material = MATERIAL_INDEX(scene_instances[instance].material);
+    ivec4 entry = scene_textures[material * 8 + slot];
+    int set = entry.w & 1;
+    texel = vec4(1.0);
+    if (entry.x < 0 || !scene_has(instance, set == 1 ? SCENE_HAS_UV1 : SCENE_HAS_UV0)) return false;
+    vec2 uv = slot_uv(material, slot, c.uv[set]);
+    vec2 size = vec2(entry.z & 0xFFFF, entry.z >> 16);
+    vec2 at = size * vec2(scene_wrapped(uv.x, (entry.w >> 2) & 3), scene_wrapped(uv.y, (entry.w >> 4) & 3));
+    if ((entry.w & 2) != 0) at = min(floor(at), size - 1.0) + 0.5;
+    vec3 place = vec3(at + 1.0, entry.y);
+#define SCENE_SAMPLE(number)                                             \
+    if ((arrays & (1 << number)) != 0 && entry.x == number) {            \
+        place.xy /= vec2(textureSize(scene_array_##number, 0).xy);       \
+        texel = textureLod(scene_array_##number, place, 0.0);            \
+    }
+    SCENE_SAMPLE(0)
+#if SCENE_ARRAY_COUNT > 1
+    SCENE_SAMPLE(1)
+#endif
+#if SCENE_ARRAY_COUNT > 2
+    SCENE_SAMPLE(2)
+#endif
+#if SCENE_ARRAY_COUNT > 3
+    SCENE_SAMPLE(3)
+#endif
+#if SCENE_ARRAY_COUNT > 4
+    SCENE_SAMPLE(4)
+#endif
+#if SCENE_ARRAY_COUNT > 5
+    SCENE_SAMPLE(5)
+#endif
+#undef SCENE_SAMPLE
+    return true;
+}
+#endif
+
 // Base colour and alpha: material factor × texture × vertex colour.
-vec4 scene_base_color(int instance, int triangle, vec2 barycentrics) {
+vec4 scene_base_color(int instance, ivec3 v, vec3 w, SceneCoordinates c) {
     vec4 color = materials[MATERIAL_INDEX(scene_instances[instance].material)].base_color;
+#ifdef SCENE_BASE_COLOR_ARRAYS
+    vec4 texel;
+    if (scene_texel(instance, BASE_COLOR_SLOT, SCENE_BASE_COLOR_ARRAYS, c, texel)) color *= texel;
+#endif
 #ifdef SCENE_COLORS_STREAM
-    ivec3 v = scene_triangle(instance, triangle);
-    vec3 w = scene_weights(barycentrics);
     color *= scene_vertex_color(v.x) * w.x + scene_vertex_color(v.y) * w.y + scene_vertex_color(v.z) * w.z;
 #endif
     return color;
@@ -192,17 +276,46 @@ vec4 scene_base_color(int instance, int triangle, vec2 barycentrics) {
 
 // Opacity before any alpha test: material factor × texture × vertex colour.
 float scene_alpha(int instance, int triangle, vec2 barycentrics) {
-    return scene_base_color(instance, triangle, barycentrics).a;
+    ivec3 v = scene_triangle(instance, triangle);
+    vec3 w = scene_weights(barycentrics);
+    return scene_base_color(instance, v, w, scene_coordinates(v, w)).a;
+}
+
+// As `tangent_frame()` of `fragment_surface.glsl`: the mesh's own tangents, else along the texture coordinates of the
+// normal map. `is_front`: the triangle turns counter-clockwise for the viewer.
+void scene_tangent_frame(
+    int instance, ivec3 v, vec3 w, mat3 corners, bool is_front, vec3 normal, out vec3 tangent, out vec3 bitangent) {
+#ifdef SCENE_TANGENTS_STREAM
+    if (scene_has(instance, SCENE_HAS_TANGENTS)) {
+        vec4 local =
+            scene_vertex_tangent(v.x) * w.x + scene_vertex_tangent(v.y) * w.y + scene_vertex_tangent(v.z) * w.z;
+        tangent = normalize(scene_direction_to_world(instance, local.xyz));
+        bitangent = cross(normal, tangent) * (scene_has(instance, SCENE_MIRRORED) ? -local.w : local.w);
+        return;
+    }
+#endif
+    int set = 0;
+#ifdef SCENE_NORMAL_ARRAYS
+    set = scene_textures[MATERIAL_INDEX(scene_instances[instance].material) * 8 + NORMAL_SLOT].w & 1;
+#endif
+    vec3 a = corners[1] - corners[0], b = corners[2] - corners[0];
+    vec2 uv0 = scene_vertex_uv(v.x, set), uv_a = scene_vertex_uv(v.y, set) - uv0, uv_b = scene_vertex_uv(v.z, set) - uv0;
+    if (is_front) {
+        uv_tangent_frame(normal, a, b, uv_a, uv_b, tangent, bitangent);
+    } else {
+        uv_tangent_frame(normal, b, a, uv_b, uv_a, tangent, bitangent);
+    }
 }
 
 // Everything a shading model reads: the surface that a geometry pass shades there, seen along -view_dir. Nothing is
 // discarded: `scene_alpha` is compared with the material's cutoff by the caller, where there is SCENE_MASKED.
 Surface scene_surface(int instance, int triangle, vec2 barycentrics, vec3 view_dir) {
-    int material = scene_instances[instance].material, flags = scene_instances[instance].flags;
-    MaterialData m = materials[MATERIAL_INDEX(material)];
+    int flags = scene_instances[instance].flags;
+    MaterialData m = materials[MATERIAL_INDEX(scene_instances[instance].material)];
     ivec3 v = scene_triangle(instance, triangle);
     vec3 w = scene_weights(barycentrics);
     mat3 corners = scene_corners(instance, triangle);
+    SceneCoordinates c = scene_coordinates(v, w);
     Surface s;
     s.position = corners * w;
     s.view_dir = view_dir;
@@ -210,7 +323,7 @@ Surface scene_surface(int instance, int triangle, vec2 barycentrics, vec3 view_d
     bool is_front = dot(front, view_dir) >= 0.0;
     s.geometric_normal = is_front ? front : -front;
 
-    vec4 base = scene_base_color(instance, triangle, barycentrics);
+    vec4 base = scene_base_color(instance, v, w, c);
     s.base_color = base.rgb;
     s.alpha = (flags & SCENE_BLENDED) != 0 ? base.a : 1.0;
 
@@ -220,10 +333,44 @@ Surface scene_surface(int instance, int triangle, vec2 barycentrics, vec3 view_d
     s.normal = normalize(normal);
 
     MaterialTexels texels = no_texels();
-#ifdef NEEDS_GRAIN
-    s.tangent = any_tangent(s.normal);
-    s.bitangent = cross(s.normal, s.tangent);
+#if SCENE_ARRAY_COUNT > 0
+    vec4 texel;
 #endif
+#ifdef SCENE_METALLIC_ROUGHNESS_ARRAYS
+    texels.has_metallic_roughness =
+        scene_texel(instance, METALLIC_ROUGHNESS_SLOT, SCENE_METALLIC_ROUGHNESS_ARRAYS, c, texel);
+    texels.metallic_roughness = texel.rgb;
+#endif
+#ifdef SCENE_SPECULAR_ARRAYS
+    if (scene_texel(instance, SPECULAR_SLOT, SCENE_SPECULAR_ARRAYS, c, texel)) texels.specular.a = texel.a;
+#endif
+#ifdef SCENE_SPECULAR_COLOR_ARRAYS
+    if (scene_texel(instance, SPECULAR_COLOR_SLOT, SCENE_SPECULAR_COLOR_ARRAYS, c, texel)) {
+        texels.specular.rgb = texel.rgb;
+    }
+#endif
+#ifdef SCENE_NORMAL_ARRAYS
+    texels.has_normal = scene_texel(instance, NORMAL_SLOT, SCENE_NORMAL_ARRAYS, c, texel);
+    texels.normal = texel.xyz;
+#endif
+#if defined(SCENE_ANISOTROPY_ARRAYS) && defined(NEEDS_GRAIN)
+    texels.has_anisotropy = scene_texel(instance, ANISOTROPY_SLOT, SCENE_ANISOTROPY_ARRAYS, c, texel);
+    texels.anisotropy = texel.rgb;
+#endif
+#ifdef SCENE_OCCLUSION_ARRAYS
+    texels.has_occlusion = scene_texel(instance, OCCLUSION_SLOT, SCENE_OCCLUSION_ARRAYS, c, texel);
+    texels.occlusion = texel.r;
+#endif
+#ifdef SCENE_EMISSIVE_ARRAYS
+    if (scene_texel(instance, EMISSIVE_SLOT, SCENE_EMISSIVE_ARRAYS, c, texel)) texels.emissive = texel.rgb;
+#endif
+#ifdef NEEDS_GRAIN
+    bool needs_frame = true;
+#else
+    bool needs_frame = texels.has_normal;
+#endif
+    bool turns = is_front != ((flags & SCENE_MIRRORED) != 0);  // counter-clockwise for the viewer
+    if (needs_frame) scene_tangent_frame(instance, v, w, corners, turns, s.normal, s.tangent, s.bitangent);
     bool flip_normal = !is_front && (flags & SCENE_DOUBLE_SIDED) != 0;
     material_surface(s, m, texels, flip_normal, (flags & SCENE_UNLIT) == 0);
     return s;
