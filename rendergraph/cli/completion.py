@@ -48,7 +48,7 @@ def _topics(ctx: Context, incomplete: str) -> list[str]:
 def _environments(ctx: Context, incomplete: str) -> Iterable[str]:
     from rendergraph.scene.environments import SHIPPED
 
-    return SHIPPED
+    return (*SHIPPED, "none")
 
 
 def _families(ctx: Context, incomplete: str) -> Iterable[str]:

@@ -249,7 +249,7 @@ SELECTION_OPTIONS = {
         type=_PATH,
         metavar="FILE",
         shell_complete=offered("environments"),
-        help="Environment map: a shipped name, .hdr or .exr.",
+        help="Environment map: a shipped name, .hdr or .exr, or `none` for the file's own lights alone.",
     ),
     "size": click.option("--size", type=SIZE, metavar="WxH", help="Size of the picture in pixels."),
     "sets": click.option(

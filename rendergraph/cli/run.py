@@ -240,7 +240,8 @@ def _draw(
         if not quiet:
             emit(str(target.path))
     assert frame is not None  # a range of frames is never empty
-    warnings.say([*frame.warnings, *(stages.not_finite_warnings(suspect, expanded, gpu) if suspect else ())])
+    broken = stages.not_finite_warnings(suspect, expanded, gpu) if suspect else ()
+    warnings.say([*frame.warnings, *(broken or stages.exposure_warnings(frame, expanded.linked))])
     return frame.as_json() | {"outputs": written}
 
 

@@ -1,4 +1,4 @@
-"""A scene at a moment, and the camera and light of a scene without them."""
+"""A scene at a moment, and the camera of a scene without one."""
 
 from __future__ import annotations
 
@@ -10,32 +10,18 @@ import numpy as np
 from msgspec.structs import replace
 
 from rendergraph.errors import InputError, Option, Place, Problem, suggestion
-from rendergraph.projection import unit
 from rendergraph.scene import scene_values
 from rendergraph.scene.cameras import WIDE, bounding_sphere, framing_camera
-from rendergraph.scene.environments import shipped
-from rendergraph.scene.geometry import rigid, translation, vec3
-from rendergraph.scene.model import Camera, Light, Placement, Scene
-
-KEY_LUX = 3.0
-STUDIO_FILL = 0.6
-"""Intensity of the studio beside the key light: at full strength, both together overexpose a white surface."""
+from rendergraph.scene.geometry import rigid, translation
+from rendergraph.scene.model import Placement, Scene
+from rendergraph.scene.surroundings import lit
 
 
-def key_light(scene: Scene, camera: Camera) -> Light:
-    """Return the light of a scene without one: 3 lux over the viewer's left shoulder."""
-    taken = {light.name for light in scene.lights}
-    direction = unit(camera.transform[:3, :3] @ np.array([1.0, -1.0, -1.0]))
-    return Light(
-        "key" if "key" not in taken else "key_light", "directional", direction=vec3(direction), intensity=KEY_LUX
-    )
+def complete(scene: Scene, camera_name: str | None = None, aspect: float = WIDE, *, bare: bool = False) -> Scene:
+    """Return the scene with a camera and with light (`surroundings.lit`); the chosen camera comes first.
 
-
-def complete(scene: Scene, camera_name: str | None = None, aspect: float = WIDE) -> Scene:
-    """Return the scene with a camera and with light; the chosen camera comes first.
-
-    A scene with neither lights nor an environment gets a key light and the `studio`. Call it once, before `at`: the
-    added light stays in place while the camera moves. `aspect` is width over height of the picture for an added camera.
+    Call it once, before `at`: the added light stays in place while the camera moves. `aspect` is width over height of
+    the picture for an added camera, and `bare` adds no surroundings.
     """
     cameras = dict(scene.cameras)
     if not cameras:
@@ -46,11 +32,7 @@ def complete(scene: Scene, camera_name: str | None = None, aspect: float = WIDE)
             raise InputError(Problem("RG322", text, Place(Option("--camera", camera_name))))
         cameras = {camera_name: cameras[camera_name], **cameras}
     first = next(iter(cameras.values()))
-    scene = replace(scene, cameras=cameras)
-    if scene.lights or scene.environment is not None:
-        return scene
-    studio = replace(shipped("studio"), intensity=STUDIO_FILL)
-    return replace(scene, lights=(key_light(scene, first),), environment=studio)
+    return lit(replace(scene, cameras=cameras), first, bare=bare)
 
 
 def moves(scene: Scene) -> bool:

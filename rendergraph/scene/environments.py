@@ -32,7 +32,7 @@ KCD_PER_UNIT = 55.0
 
 _Plane: TypeAlias = npt.NDArray[np.float32]
 _GROUND = (0.22, 0.2, 0.18)
-_ROOM = 0.22
+_ROOM = 0.38
 # Wall (axis and side), middle and half sides on the room's wall, radiance. The room reaches from -1 to 1.
 _BOXES = (
     ((1, 1.0), (0.0, 0.1), (0.55, 0.5), 3.6),  # overhead, along x and z

@@ -73,6 +73,10 @@ def figures_of(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, float | list
     return found
 
 
+_BLACK, _CLIPPED = 5, 254
+"""Of 255: the mean of a picture that is almost black, and a channel from which on it is clipped."""
+
+
 @dataclass(frozen=True, eq=False)
 class Frame(Mapping[str, npt.NDArray[Any]]):
     """A rendered frame; `frame["image"]` is an array with the top row first.
@@ -165,6 +169,20 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
                 text += " (drawn in magenta)" if array.dtype == "uint8" else ""
                 warnings[name] = Problem("RG619", text, Place(self.pipeline), severity="warning")
         return warnings
+
+    @cached_property
+    def badly_exposed(self) -> Mapping[str, str]:
+        """Pictures for the display that are almost black, or for the most part clipped: their names, and which."""
+        found = {}
+        for name, array in self.arrays.items():
+            if self.infos[name].semantic != "display_color" or array.dtype != "uint8" or array.shape[-1] < 3:
+                continue
+            colors = array[..., :3]
+            if colors.mean() < _BLACK:
+                found[name] = "almost black"
+            elif (colors.max(axis=-1) >= _CLIPPED).mean() > 0.5:
+                found[name] = "clipped in more than half of its pixels"
+        return found
 
     def as_json(self) -> dict[str, object]:
         """Return the fields of `run --json`, without the paths."""

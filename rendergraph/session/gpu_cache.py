@@ -86,7 +86,7 @@ class GpuCache:
         self.scenes_made += 1
         self.image_warnings = warnings
         scene = GpuScene(self._device, linked.scene, pack.pack(linked.scene), decoded, decoded_light)
-        if linked.selection.environment is not None:
+        if linked.selection.environment is not None and linked.scene.environment is not None:
             scene.environment()  # the user named it: a broken one is an error whether or not it is read
         self._scene = linked.scene, scene
         return scene

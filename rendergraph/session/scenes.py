@@ -38,11 +38,12 @@ def scene_of(resolved: Resolved) -> Scene:
         scene = Scene("empty")
         if spec.scene is not None:
             scene = load(spec.scene, check_path=spec.roots.check, limits=limits, extensions=extensions)
-        if selection.environment is not None:
+        bare = selection.environment == Path("none")
+        if selection.environment is not None and not bare:
             scene = replace(scene, environment=_environment(selection.environment, scene, limits, extensions))
         scene = _measured(scene, limits)
     framed = () if scene.cameras else (shape,)
-    _IN_USE[(*key, *framed)] = made = replace(complete(scene, selection.camera, shape), files=files)
+    _IN_USE[(*key, *framed)] = made = replace(complete(scene, selection.camera, shape, bare=bare), files=files)
     return made
 
 

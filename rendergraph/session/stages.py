@@ -216,6 +216,20 @@ def draw(expanded: Expanded, gpu: Gpu, lead: int | None = None) -> Iterator[Fram
         yield frame
 
 
+def exposure_warnings(frame: Frame, linked: Linked) -> list[Problem]:
+    """Return warnings about pictures that are almost black or mostly clipped, with what would help."""
+    exposed = [node.id for node in linked.graph.nodes if "exposure" in node.type.cls.parameters()]
+    setting = f"`-s {exposed[-1]}.exposure={{}}`" if exposed else "another exposure"
+    found = []
+    for name, state in frame.badly_exposed.items():
+        help = setting.format("+3" if "black" in state else "-3")
+        if "black" in state and linked.scene.environment is None:
+            help += " or `--environment studio`"
+        text = f"the picture '{name}' is {state}; try {help}"
+        found.append(Problem("RG624", text, Place(frame.pipeline), severity="warning"))
+    return found
+
+
 def not_finite_warnings(frame: Frame, expanded: Expanded, gpu: Gpu, camera: Camera | None = None) -> list[Problem]:
     """Return warnings about NaN and infinity in a frame's outputs, which name the port that held them first.
 
