@@ -218,8 +218,13 @@ def draw(expanded: Expanded, gpu: Gpu, lead: int | None = None) -> Iterator[Fram
 
 def exposure_warnings(frame: Frame, linked: Linked) -> list[Problem]:
     """Return warnings about pictures that are almost black or mostly clipped, with what would help."""
-    exposed = [node.id for node in linked.graph.nodes if "exposure" in node.type.cls.parameters()]
-    setting = f"`-s {exposed[-1]}.exposure={{}}`" if exposed else "another exposure"
+    stops = [
+        f"{node.id}.{name}"
+        for node in reversed(linked.graph.nodes)
+        for name, parameter in node.type.cls.parameters().items()
+        if parameter.unit == "EV"
+    ]
+    setting = f"`-s {stops[0]}={{}}`" if stops else "another exposure"
     found = []
     for name, state in frame.badly_exposed.items():
         help = setting.format("+3" if "black" in state else "-3")
