@@ -220,9 +220,9 @@ def exposure_warnings(frame: Frame, linked: Linked) -> list[Problem]:
     """Return warnings about pictures that are almost black or mostly clipped, with what would help."""
     stops = [
         f"{node.id}.{name}"
-        for node in reversed(linked.graph.nodes)
+        for node in linked.graph.nodes
         for name, parameter in node.type.cls.parameters().items()
-        if parameter.unit == "EV"
+        if parameter.unit == "EV" and (parameter.limits.low or 0) < 0
     ]
     setting = f"`-s {stops[0]}={{}}`" if stops else "another exposure"
     found = []
