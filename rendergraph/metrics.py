@@ -7,6 +7,9 @@
 | SSIM | of the encoded values, the mean of R, G and B | of the values clipped to 0…1 and encoded |
 | FLIP | LDR-FLIP, the mean over pixels | HDR-FLIP, exposures from the reference |
 
+Light has a relative mean square error besides (`relative_mse`), which counts a difference in a dark part of the
+picture as much as one in a bright part.
+
 Textures that are neither, such as occlusion or depth (`values`), have the RMSE of their values; the other metrics map
 the reference's minimum and maximum to 0…1 if they lie outside.
 
@@ -37,6 +40,8 @@ Encoding: TypeAlias = Literal["display", "linear", "values"]
 
 PIXELS_PER_DEGREE = 67.0206
 """FLIP's default viewer: 0.7 m before a screen 0.7 m wide with 3840 pixels."""
+RELATIVE_EPSILON = 0.01
+"""Added to the squared light by which squared errors are divided, so that black pixels do not decide the mean."""
 _WINDOW = 11
 _SIGMA = 1.5
 
@@ -148,6 +153,44 @@ def rmse(a: Pixels, b: Pixels) -> float:
     return math.sqrt(error) if math.isfinite(error) else math.nan
 
 
+def relative_mse(light: Pixels, reference: Pixels) -> float:
+    """Return the mean over pixels and channels of (a − r)² / (r² + 0.01); NaN if a value is NaN or infinite.
+
+    Rousselle et al., "Adaptive Sampling and Reconstruction using Greedy Error Minimization", 2011.
+
+    Args:
+        light: a, scene-linear light, (height, width, channels).
+        reference: r, of the same size.
+    """
+    a, r = colors(light), colors(reference)
+    return relative_noise(np.square(a - r), r)
+
+
+def relative_noise(variance: Pixels, reference: Pixels) -> float:
+    """Return the relative mean square error that light has because of its own variance: the mean of v / (r² + 0.01).
+
+    Args:
+        variance: v, of the mean in each pixel, (height, width, channels); one channel holds for all.
+        reference: r, the light.
+    """
+    with np.errstate(invalid="ignore", over="ignore"):  # infinity against infinity
+        error = float(np.mean(colors(variance) / (np.square(colors(reference)) + RELATIVE_EPSILON)))
+    return error if math.isfinite(error) else math.nan
+
+
+def signed_difference(light: Pixels, reference: Pixels) -> Floats:
+    """Return how much too bright each pixel is, (height, width): −1 is black where there is light, 0 equal.
+
+    It is the difference of the luminances (Rec. 709) as a part of the greater one, to which a hundredth of the
+    reference's mean luminance is added, so that the darkest parts do not show noise alone.
+    """
+    a, r = (colors(each) @ (0.2126, 0.7152, 0.0722) for each in (light, reference))
+    known = r[np.isfinite(r)]
+    floor = 0.01 * float(known.mean()) if known.size else 0.0
+    with np.errstate(invalid="ignore"):
+        return np.asarray((a - r) / (np.maximum(a, r) + max(floor, 1e-9)))
+
+
 def psnr(error: float) -> float | None:
     """Return the peak signal-to-noise ratio in dB of an RMSE whose peak is 1; None for an RMSE of 0."""
     return -20.0 * math.log10(error) if error > 0 else None
@@ -212,6 +255,7 @@ def description() -> dict[str, Any]:
     return {
         "rmse": {"on": "sRGB-encoded R, G, B, 0…1; linear values for scene-linear references"},
         "psnr": {"peak": 1.0},
+        "relative_mse": {"on": "linear R, G, B of the light", "epsilon": RELATIVE_EPSILON},
         "ssim": {"window": _WINDOW, "sigma": _SIGMA, "k1": 0.01, "k2": 0.03, "channels": "mean of R, G, B"},
         "flip": {
             "library": f"OpenImageIO {version('OpenImageIO')}",

@@ -233,6 +233,7 @@ def _node_text(node: Entry) -> str:
     return sections(
         f"{node['name']}  ({node['family']})" if node["family"] else node["name"],
         node["doc"],
+        f"Its exact twin, with the same outputs, is {node['twin']}." if node["twin"] else "",
         section("Inputs", inputs),
         section("Outputs", outputs),
         section("Internal textures", internal),

@@ -111,11 +111,13 @@ def _names(cls: type[Node], lenient: bool) -> Iterator[Problem]:
             yield _problem(group, f"group '{group}' has the name of a port or parameter")
     inherited = {name for base in cls.__mro__[1:] if issubclass(base, Node) for name in base.ports()}
     for name, value in vars(cls).items():
-        if value is None and name != "shader" and name[0] != "_" and name not in {*inherited, *parameters}:
+        if value is None and name not in ("shader", "twin") and name[0] != "_" and name not in {*inherited, *parameters}:
             yield _problem(name, f"'{name}' is None, which drops a port that a base declares; none declares '{name}'")
     shader = cls.shader
     if shader is not None and (not isinstance(shader, str) or not shader.endswith((".frag", ".comp"))):
         yield _problem("shader", f"`shader` is {shader!r}; it is a file that ends in .frag or .comp")
+    if cls.twin is not None and not (isinstance(cls.twin, str) and cls.twin.isidentifier()):
+        yield _problem("twin", f"`twin` is {cls.twin!r}; it is the name of a node type, such as 'traced_shadows'")
 
 
 def _docs(cls: type[Node]) -> Iterator[Problem]:

@@ -65,6 +65,12 @@ class Node:
     """Shader of the default `record`: a fragment shader, or a compute shader, which ends in `.comp`; the type's name
     with `.frag` where None."""
 
+    twin: ClassVar[str | None] = None
+    """Type that computes the same exactly and takes this one's place, with the same outputs: `"traced_shadows"`.
+
+    `compare --reference` puts it there to find out how much of the error comes from this technique.
+    """
+
     def validate(self) -> None:
         """Refuse what types and limits of the parameters let through: `raise ValueError("far must be beyond near")`.
 

@@ -32,6 +32,7 @@ def describe_node(node_type: NodeType, extensions: Extensions | None = None) -> 
         "plugin": node_type.plugin,
         "file": str(node_type.file),
         "doc": inspect.getdoc(cls) or "",
+        "twin": cls.twin if cls.twin != node_type.name else None,
         "extends": _import_lines(node_type),
         "inputs": [
             _input(name, port) | ({"group": groups[name]} if name in groups else {})
