@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 BEYOND = 4
 """Exit code of a comparison that exceeds a threshold."""
-_LIMITED = ("flip", "rmse", "radiance_rmse")
+_LIMITED = ("flip", "rmse", "radiance_rmse", "relative_mse")
+_TRUTH = ("noise", "samples", "seconds")
 SOFTWARE = "times on a software rasteriser: not comparable to a GPU"
 
 
@@ -58,6 +59,26 @@ reference_option = click.option(
     metavar="FILE|PIPELINE",
     shell_complete=options.offered("pipelines"),
     help="Measure against this picture or pipeline; the first by default.",
+)
+truth_options = options.together(
+    click.option(
+        "--reference-noise",
+        type=click.FloatRange(0, min_open=True),
+        metavar="PART",
+        help="Draw a reference that accumulates until its noise is this part of the smallest error.  [default: 0.1]",
+    ),
+    click.option(
+        "--reference-samples",
+        type=click.IntRange(1),
+        metavar="N",
+        help="Draw at most so many samples of each pixel of it.",
+    ),
+    click.option(
+        "--reference-seconds",
+        type=click.FloatRange(0, min_open=True),
+        metavar="SECONDS",
+        help="Draw it at most so long.  [default: 120]",
+    ),
 )
 metric_option = click.option(
     "--metric",
@@ -101,6 +122,7 @@ report_options = options.together(
     help="Compare the pipeline with these settings, several in one text; a single one with the unchanged pipeline.",
 )
 @reference_option
+@truth_options
 @metric_option
 @options.selection_options
 @click.option("-n", "--frames", type=click.IntRange(1, 10_000), default=10, show_default=True, help="Measured frames.")
@@ -123,7 +145,9 @@ def command(
 
     All are rendered with one scene, one camera and at one size: those of the first pipeline, or of the options. Options
     such as -s apply to all pipelines, but not to the reference. Times are medians of frames that the pipelines take
-    turns to render. Pictures alone, without options that change how they were made, are compared as they are.
+    turns to render. A reference with the outputs `radiance` and `variance`, such as a path tracer, is drawn until its
+    noise is far below the errors, and kept on the disk for the next time. Pictures alone, without options that change
+    how they were made, are compared as they are.
 
     \b
     Examples:
@@ -156,7 +180,8 @@ def command(
         names, variants = _variants(pipelines, withs, select)
         check_thresholds(thresholds, variants[0].link().catalog.extensions)
         against = load_reference(reference, select)
-        comparison = compare(variants, against, names=names, progress=on_terminal(), **settings)
+        given = {name: value for name, value in settings.items() if value is not None}
+        comparison = compare(variants, against, names=names, progress=on_terminal(), **given)
     warn(comparison.warnings)
     for line in comparison.notes:
         say(line)
@@ -194,7 +219,7 @@ def _are_pictures(names: Sequence[str], reference: str | None, select: options.S
     from rendergraph.session.picture_metadata import is_picture
 
     source, context = click.core.ParameterSource, click.get_current_context()
-    drawn = {"frames", "frame", "device", "executor"} & {
+    drawn = {"frames", "frame", "device", "executor", *(f"reference_{name}" for name in _TRUTH)} & {
         name for name in context.params if context.get_parameter_source(name) is source.COMMANDLINE
     }
     changed = select("") != Selection("", plugins=select("").plugins)
@@ -261,6 +286,7 @@ def exceeded(results: Sequence[Result], thresholds: Sequence[Threshold]) -> list
     lines = []
     for result in results:
         values = {**result.metrics.as_json(), "radiance_rmse": result.radiance_rmse, **result.metrics.plugins}
+        values["relative_mse"] = result.relative_mse
         for threshold in thresholds:
             value = values.get(threshold.metric) if not result.not_finite else math.nan
             if value is None or not value <= threshold.most:
@@ -275,6 +301,7 @@ def summary(results: Sequence[Result]) -> tuple[tuple[str, ...], list[tuple[obje
         ("", lambda r: r.name),
         ("FLIP", lambda r: f"{r.metrics.flip:.4f}"),
         ("RMSE", lambda r: f"{r.metrics.rmse:.4f}"),
+        *([("rel. MSE", _relative)] if any(result.relative_mse is not None for result in results) else []),
         ("PSNR", lambda r: "∞" if r.metrics.psnr is None else f"{r.metrics.psnr:.2f}"),
         ("SSIM", lambda r: f"{r.metrics.ssim:.4f}"),
         *((name, partial(_figure, name)) for name in dict.fromkeys(n for result in results for n in result.columns)),
@@ -291,6 +318,10 @@ def summary(results: Sequence[Result]) -> tuple[tuple[str, ...], list[tuple[obje
     return tuple(name for name, _ in columns), rows
 
 
+def _relative(result: Result) -> str:
+    return "–" if result.relative_mse is None else f"{result.relative_mse:.4g}"
+
+
 def _figure(name: str, result: Result) -> str:
     value = result.columns.get(name)
     return "–" if value is None else f"{value:.4g}"
@@ -305,8 +336,27 @@ def _text(comparison: Comparison) -> str:
     lines = [", ".join(filter(None, where)), table(rows, heads, right=range(1, len(heads)))]
     if comparison.software:
         lines.append(SOFTWARE)
+    lines += truth_lines(comparison)
     lines += [_difference(comparison, result) for result in comparison.results]
     return "\n".join(filter(None, lines))
+
+
+def truth_lines(comparison: Comparison) -> list[str]:
+    """Return the noise of a truth, and the technique to which each variant owes most of its error."""
+    reference, share = comparison.reference, comparison.noise_share
+    if reference.noise is None:
+        return []
+    part = f", {100 * share:.2g} % of the smallest error" if share is not None else ""
+    lines = [f"noise of {reference.name} after {reference.samples} samples: relative MSE {reference.noise:.3g}{part}"]
+    for result in comparison.results:
+        for one in result.error_by[:1]:
+            if one.relative_mse is None or one.reduction is None or one.reduction <= 0:
+                continue
+            lines.append(
+                f"{result.name}: most of its error comes from '{one.node}' ({one.type}): with {one.twin} the relative "
+                f"MSE is {one.relative_mse:.4g}, {100 * one.reduction:.3g} % smaller"
+            )
+    return lines
 
 
 def _difference(comparison: Comparison, result: Result) -> str:

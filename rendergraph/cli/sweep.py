@@ -76,6 +76,7 @@ def _group(text: str) -> tuple[str, ...]:
 )
 @click.option("--csv", "as_csv", is_flag=True, help="Write results.csv, too: a row for each run.")
 @shared.reference_option
+@shared.truth_options
 @shared.metric_option
 @options.selection_options
 @click.option("-n", "--frames", type=click.IntRange(1, 10_000), help="Measured frames.  [default: 5]")
@@ -159,6 +160,8 @@ def command(
         say(f"{amount(kept, 'run')} kept in {out}{way}")
         raise
     warn([*outcome.comparison.warnings, *extensions.warnings])
+    for line in outcome.comparison.notes:
+        say(line)
     if outcome.timed:
         say(f"{amount(outcome.timed, 'run')} reused, timed again over {amount(how.frames, 'frame')}")
     if outcome.redrawn:
@@ -272,6 +275,7 @@ def _text(outcome: Sweep) -> str:
     ]
     if comparison.software:
         lines.append(shared.SOFTWARE)
+    lines += shared.truth_lines(comparison)
     if (search := outcome.search) is not None:
         front_rows = [(name, *map(_value, search.values[name])) for name in search.front]
         lines.append(table(front_rows, ("minimum", *search.minimise)))

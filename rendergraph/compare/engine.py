@@ -96,7 +96,8 @@ def compare(
 
     Args:
         pipelines: the pipelines, also by their names or files; all use the scene and size of the first one.
-        reference: a picture file or another pipeline, also by its name; the first of `pipelines` by default.
+        reference: a picture file or another pipeline, also by its name; the first of `pipelines` by default. One with
+            the outputs `radiance` and `variance` is a truth: it is drawn until its noise is small.
         options: how to render and measure; in this process, the default, the pipelines take turns.
         names: of the pipelines; those of their files by default.
         settings: attributes of `SweepOptions` by name: `frames=20, metric="ao.occlusion"`.
@@ -118,7 +119,8 @@ def compare(
     with track_reads() as files:
         if isinstance(reference, Pipeline):
             reference = measured_at(reference, options.metric)
-        prepared = prepare_variants([measured_at(each, options.metric) for each in given], reference, options, names)
+        variants = [measured_at(each, options.metric) for each in given]
+        prepared = prepare_variants(variants, reference, options, names, twins=True)
     runner = Runner(prepared, options)
     travels = all(catalog is None for catalog in catalogs)
     with (
@@ -127,7 +129,7 @@ def compare(
     ):
         farm.upload_inputs(lambda: make_bundle(files, given[0].selection.plugins, prepared.modules))
         runner.execute(farm, report)
-    runs = [*prepared.runs, *([prepared.other] if prepared.other else [])]
+    runs = [*prepared.runs, *(run for run in (prepared.other, prepared.truth) if run is not None)]
     return runner.comparison(
         warnings=[problem for run in runs for problem in run.planned.linked.catalog.extensions.warnings]
     )
@@ -172,7 +174,7 @@ def sweep(
         missing = runner.missing
         resumed, timed = len(runs) - len(missing), sum(number in runner.results for number in missing)
         redrawn = sum((runs[n].folder / RUN).exists() for n in missing if n not in runner.results)
-        if missing or prepared.other:
+        if missing or prepared.other or prepared.truth:
             with (
                 options.open_executor(-(-len(missing) // MOST_RUNS), travels=base.catalog is None) as farm,
                 report_progress(options.progress, "runs") as report,

@@ -54,7 +54,7 @@ def light_of(graph: Graph) -> Endpoint:
         # Output transforms, which turn radiance into colours; what lies behind them works on the picture.
         ends = {end for end in {shown, *nx.ancestors(ports, shown)} if _is_transform(graph, end)} or {shown}
         ports.add_edges_from((end, _PICTURE) for end in ends)
-        dominators = nx.immediate_dominators(ports, _SCENE)
+        dominators: dict[Endpoint, Endpoint] = nx.immediate_dominators(ports, _SCENE)
         found, end = [], dominators.get(_PICTURE, _SCENE)
         while end != _SCENE:
             found.append(end)

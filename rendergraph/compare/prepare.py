@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -15,9 +16,10 @@ from msgspec import Struct, structs
 
 from rendergraph.compare.batches import MOST_BYTES
 from rendergraph.compare.fingerprint import file_digest, run_key, worker_digest
+from rendergraph.compare.light import light_of
 from rendergraph.compare.results import Pixels, Reference
 from rendergraph.compare.space import Axes, Space, pipelines, run_name, unique_names
-from rendergraph.errors import InputError, Option, Place, Problem
+from rendergraph.errors import InputError, Option, Place, Problem, UsageError
 from rendergraph.farm.bundle import relocate_selection
 from rendergraph.metrics import Encoding, check_sizes
 from rendergraph.session import stages
@@ -26,15 +28,16 @@ from rendergraph.session.pipeline import Pipeline, load
 from rendergraph.textures import FORMATS
 
 if TYPE_CHECKING:
-    from rendergraph.catalog import Catalog
+    from rendergraph.catalog import Catalog, NodeType
     from rendergraph.farm import Executor, Worker
     from rendergraph.farm.executors import ExecutorChoice
-    from rendergraph.link import Graph
+    from rendergraph.link import Endpoint, Graph
     from rendergraph.session.gpu import Gpu
     from rendergraph.session.progress import Progress
     from rendergraph.session.selection import Selection
     from rendergraph.session.values import Planned
 
+REFERENCE_NOISE, REFERENCE_SECONDS = 0.1, 120.0
 METRIC = "metric"
 """Name of the output that is added for a measured port."""
 _INTEGER_FORMATS = frozenset(name for name, format in FORMATS.items() if format.family in ("int", "uint"))
@@ -65,6 +68,21 @@ class SweepKeywords(TypedDict, total=False):
     timeout: float | None
     progress: Progress | bool | None
     events: Events | None
+    reference_noise: float
+    reference_samples: int | None
+    reference_seconds: float
+
+
+class TruthLimits(Struct, frozen=True):
+    """When a truth is exact enough: at that part of the smallest error, or after so many samples or seconds."""
+
+    noise: float
+    samples: int | None
+    seconds: float
+
+    @property
+    def most_samples(self) -> float:
+        return self.samples or math.inf
 
 
 class SweepOptions(Struct, frozen=True, kw_only=True, eq=False):
@@ -92,6 +110,8 @@ class SweepOptions(Struct, frozen=True, kw_only=True, eq=False):
         timeout: seconds without progress before a worker process is replaced.
         progress: a function that receives how many runs are done, and of how many; True shows a bar on stderr.
         events: a function that receives an event for each step of each worker, as a mapping of plain values.
+        reference_noise: draw a truth until its own noise is this part of the smallest error.
+        reference_samples, reference_seconds: stop before, at so many samples of a pixel or after so many seconds.
     """
 
     metric: str | None = None
@@ -113,6 +133,13 @@ class SweepOptions(Struct, frozen=True, kw_only=True, eq=False):
     timeout: float | None = None
     progress: Progress | bool | None = None
     events: Events | None = None
+    reference_noise: float = REFERENCE_NOISE
+    reference_samples: int | None = None
+    reference_seconds: float = REFERENCE_SECONDS
+
+    @property
+    def limits(self) -> TruthLimits:
+        return TruthLimits(self.reference_noise, self.reference_samples, self.reference_seconds)
 
     def replace(self, **settings: Any) -> Self:
         return structs.replace(self, **settings)
@@ -143,6 +170,7 @@ class Run:
         reference_key: what decides the picture that it is measured against.
         selection, digest: the pipeline, and what its picture depends on, as they were when the run's task was created.
         is_rendered: its picture exists already; only times are needed.
+        light: the port whose light is measured against a truth.
     """
 
     number: int
@@ -157,6 +185,7 @@ class Run:
     digest: str = ""
     metadata: Mapping[str, str] = field(default_factory=dict)
     is_rendered: bool = False
+    light: Endpoint | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "planned": None}
@@ -192,12 +221,25 @@ class Run:
 
 
 @dataclass(frozen=True, eq=False)
+class Twin:
+    """A run of a comparison with the twin of one of its nodes in that node's place."""
+
+    number: int
+    node: str
+    type: str
+    twin: str
+    run: Run
+
+
+@dataclass(frozen=True, eq=False)
 class Prepared:
     """A comparison of which nothing is rendered yet; everything that can be checked without GL has been checked.
 
     Attributes:
         output, encoding: what is compared.
-        picture, other: the reference, where it is a file, or a pipeline of its own.
+        picture, other, truth: the reference, where it is a file, a pipeline of its own, or one that becomes more exact
+            from frame to frame.
+        twins: runs that show how much of an error comes from which technique.
         notes: changes that made the pipelines comparable.
         space, study: the axes of a sweep, and what identifies its folder.
     """
@@ -208,6 +250,8 @@ class Prepared:
     picture: Reference | None
     other: Run | None
     notes: tuple[str, ...]
+    truth: Run | None = None
+    twins: tuple[Twin, ...] = ()
     space: Space = field(default_factory=lambda: Space(()))
     study: Mapping[str, Any] = field(default_factory=dict)
 
@@ -218,7 +262,8 @@ class Prepared:
 
     @property
     def modules(self) -> set[str]:
-        runs = [*self.runs, *([self.other] if self.other else [])]
+        others = [run for run in (self.other, self.truth, *(twin.run for twin in self.twins)) if run is not None]
+        runs = [*self.runs, *others]
         return {type(node.node).__module__ for run in runs for node in run.planned.linked.graph.nodes}
 
 
@@ -247,7 +292,10 @@ def prepare(
         names = [names[number] for number in options.only]
     prepared = prepare_variants(pipelines(base, combinations), reference, options, names)
     picture = prepared.picture
-    key = file_digest(Path(picture.name)) if picture else run_key(prepared.base.planned, options.frame, "")
+    if prepared.truth is not None:
+        key = f"{run_key(prepared.truth.planned, options.frame, '')} {options.limits}"
+    else:
+        key = file_digest(Path(picture.name)) if picture else run_key(prepared.base.planned, options.frame, "")
     runs = tuple(
         replace(run, settings=setting, folder=out / run.name, reference_key=key)
         for run, setting in zip(prepared.runs, combinations, strict=True)
@@ -256,29 +304,109 @@ def prepare(
 
 
 def prepare_variants(
-    variants: Sequence[Pipeline], reference: Path | Pipeline | None, options: SweepOptions, names: Sequence[str] = ()
+    variants: Sequence[Pipeline],
+    reference: Path | Pipeline | None,
+    options: SweepOptions,
+    names: Sequence[str] = (),
+    *,
+    twins: bool = False,
 ) -> Prepared:
-    """Plan pipelines, which already have the measured port, with the scene and size of the first one."""
+    """Plan pipelines, which already have the measured port, with the scene and size of the first one.
+
+    With `twins`, and against a truth, their techniques' twins are planned, too.
+    """
     others = [reference] if isinstance(reference, Pipeline) else []
+    is_truth = options.metric is None and any(
+        {"radiance", "variance"} <= o.resolve().spec.outputs.keys() for o in others
+    )
+    if is_truth:
+        others = [_seen_as(variants[0], other) for other in others]
     matched, notes = match_scene_and_size([*variants, *others])
     planned = [pipeline.check() for pipeline in matched]
+    if not is_truth and options.limits != SweepOptions().limits:
+        text = "--reference-noise, --reference-samples and --reference-seconds belong to a reference that accumulates"
+        raise UsageError(Problem("RG500", f"{text}: a pipeline with the outputs `radiance` and `variance`"))
     graphs = [each.linked.graph for each in planned]
     names = unique_names(names or [graph.name for graph in graphs[: len(variants)]])
     picture = read_picture(reference, graphs[0].size, names[0]) if isinstance(reference, Path) else None
-    output, encoding = compared_output(graphs, picture[1] if picture else None, measured=options.metric is not None)
+    compared = graphs[: len(variants)] if is_truth else graphs
+    output, encoding = compared_output(compared, picture[1] if picture else None, measured=options.metric is not None)
     called = [*names, *(graph.name for graph in graphs[len(variants) :])]
     runs = [
-        Run(number if number < len(variants) else -1, name, each, output, options.frame)
+        Run(
+            number if number < len(variants) else -1,
+            name,
+            each,
+            output,
+            options.frame,
+            light=light_of(each.linked.graph) if is_truth and number < len(variants) else None,
+        )
         for number, (name, each) in enumerate(zip(called, planned, strict=True))
     ]
+    found: list[Twin] = []
+    for run, pipeline in zip(runs, matched, strict=False) if is_truth and twins else ():
+        found += _twins(run, pipeline, notes)
     return Prepared(
         runs=tuple(runs[: len(variants)]),
         output=output,
         encoding=encoding,
         picture=Reference(str(reference), "file", picture[0], encoding, output) if picture else None,
-        other=runs[-1] if others else None,
+        other=runs[-1] if others and not is_truth else None,
+        truth=runs[-1] if is_truth else None,
+        twins=tuple(found),
         notes=tuple(notes),
     )
+
+
+def _seen_as(first: Pipeline, truth: Pipeline) -> Pipeline:
+    """Return a truth with the camera and the environment of what is compared, unless it has others."""
+    own, other = truth.selection, first.selection
+    return truth.select(camera=own.camera or other.camera, environment=own.environment or other.environment)
+
+
+def _twins(run: Run, pipeline: Pipeline, notes: list[str]) -> Iterator[Twin]:
+    """Yield a run for each technique that has a twin, with the twin in its place; a note where it does not fit."""
+    if run.light is None:
+        return  # the truth itself
+    linked = run.planned.linked
+    catalog, needed = linked.catalog, run.planned.plan.schedule.steps
+    used = {step.node for step in needed} | {function.node for step in needed for function in step.functions}
+    for node in linked.graph.nodes:
+        twin = node.type.cls.twin
+        if twin is None or twin == node.type.name or node.id not in used:
+            continue
+        try:
+            changed = replace(_with_twin(pipeline, node.id, catalog.get(twin)), catalog=catalog).check()
+            light = run.light if run.light in changed.linked.graph.textures else light_of(changed.linked.graph)
+        except InputError as error:
+            reason = error.problems[0].message
+            notes.append(f"'{node.id}' of '{run.name}' cannot be replaced by its twin '{twin}': {reason}")
+            continue
+        own = Run(-1, f"{run.name} with {twin}", changed, run.output, run.frame, light=light)
+        yield Twin(run.number, node.id, node.type.name, twin, own)
+
+
+def _with_twin(pipeline: Pipeline, node: str, twin: NodeType) -> Pipeline:
+    """Return a pipeline with another type for a node, without what was set for the node and the type lacks."""
+    selection = pipeline.selection
+    known = {*twin.cls.parameters(), *twin.cls.inputs(), *twin.cls.groups(), "enabled"}
+    kept = [text for text in selection.sets if _path(text) not in {(node, "type")} and not _is_lost(text, node, known)]
+    patches = selection.patches
+    spec = pipeline.resolve().spec.nodes.get(node)
+    if spec is not None and "/" not in node:
+        lost = {part: {key: None for key in getattr(spec, part) if key not in known} for part in ("params", "inputs")}
+        patches = (*patches, {"nodes": {node: {part: keys for part, keys in lost.items() if keys}}})
+    return pipeline.select(sets=(*kept, f"{node}.type={twin.name}"), patches=patches)
+
+
+def _path(setting: str) -> tuple[str, str]:
+    node, _, name = setting.partition("=")[0].strip().rpartition(".")
+    return node, name
+
+
+def _is_lost(setting: str, node: str, known: Collection[str]) -> bool:
+    owner, name = _path(setting)
+    return owner == node and name not in known
 
 
 def _study(base: Pipeline, frame: int, reference: str) -> dict[str, Any]:

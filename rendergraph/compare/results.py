@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
+import numpy as np
 import numpy.typing as npt
 from msgspec import to_builtins
 
@@ -40,6 +41,8 @@ class Reference:
     Attributes:
         output: the name of the compared output.
         light: its scene-linear light, if any.
+        noise: of a truth, the relative mean square error that its own noise adds to that of each variant.
+        samples: of a truth, the samples of a pixel.
     """
 
     name: str
@@ -48,12 +51,37 @@ class Reference:
     encoding: Encoding
     output: str
     light: Pixels | None = None
+    noise: float | None = None
+    samples: int | None = None
 
     def __repr__(self) -> str:
         return f"<Reference {self.name} ({self.kind}): {self.output}>"
 
     def as_json(self) -> dict[str, Any]:
-        return {"name": self.name, "kind": self.kind, "output": self.output}
+        document = {"name": self.name, "kind": self.kind, "output": self.output}
+        return document | ({} if self.samples is None else {"samples": self.samples})
+
+
+@dataclass(frozen=True)
+class TwinError:
+    """One technique of a variant, and the relative mean square error of the variant's light without its error.
+
+    Attributes:
+        node, type: the technique.
+        twin: the type that computes the same exactly.
+        relative_mse: with the twin in its place; None where it cannot take that place or cannot be drawn.
+        reduction: how much smaller that is than the variant's own, as a part of it.
+    """
+
+    node: str
+    type: str
+    twin: str
+    relative_mse: float | None
+    reduction: float | None
+
+    def as_json(self) -> dict[str, Any]:
+        fields = ("type", "twin", "relative_mse", "reduction")
+        return {name: getattr(self, name) for name in fields}
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +137,9 @@ class Result:
         source: the pipeline as it was typed.
         settings: path to value, as a sweep set them.
         pixels: the compared output; None where the picture was not kept, likewise `flip_map`, (height, width), 0…1.
-        radiance_rmse: of linear light against the reference's; None where one of them has none.
+        radiance_rmse, relative_mse: of linear light against the reference's; None where one of them has none.
+        signed_map: how much too bright the light is at each pixel, against a truth: see `metrics.signed_difference`.
+        error_by: what twins of its techniques reduce the error to, the greatest reduction first.
         graph, plan, memory: None and empty for pictures that were read from files.
         difference: of the graph to the base's.
         first: the first pass whose output differs from the base's.
@@ -127,6 +157,9 @@ class Result:
     pass_count: int = 0
     settings: Mapping[str, str] = field(default_factory=dict)
     radiance_rmse: float | None = None
+    relative_mse: float | None = None
+    signed_map: Pixels | None = None
+    error_by: tuple[TwinError, ...] = ()
     flip_map: Pixels | None = None
     graph: Graph | None = None
     plan: ResourcePlan | None = None
@@ -180,7 +213,10 @@ class Result:
         if self.settings:
             document["settings"] = typed_settings(self.settings)
         document |= self.metrics.as_json()
-        document |= {"radiance_rmse": self.radiance_rmse, "not_finite": self.not_finite}
+        document |= {"radiance_rmse": self.radiance_rmse, "relative_mse": self.relative_mse}
+        document |= {"not_finite": self.not_finite}
+        if self.error_by:
+            document["error_by"] = {one.node: one.as_json() for one in self.error_by}
         if self.figures:
             document["figures"] = dict(self.figures)
         if self.memory:
@@ -235,9 +271,16 @@ class Comparison:
         """Whether a CPU rasteriser rendered: its times say nothing about GPUs."""
         return bool(self.device.get("software"))
 
+    @property
+    def noise_share(self) -> float | None:
+        """The noise of a truth as a part of the smallest error; None without one."""
+        smallest = smallest_error(self.results)
+        return self.reference.noise / smallest if self.reference.noise is not None and smallest else None
+
     def as_json(self) -> dict[str, Any]:
         return {
             "reference": self.reference.as_json(),
+            **({} if self.reference.noise is None else {"reference_noise": self.reference.noise}),
             "scene": self.scene,
             "camera": self.camera,
             "size": list(self.size),
@@ -270,10 +313,21 @@ def measure_against(
     return metrics.measure(pixels, reference.pixels, encoding=reference.encoding, names=names, plugins=plugins)
 
 
-def light_error(light: Pixels | None, reference: Pixels | None) -> float | None:
-    if light is None or reference is None:
-        return None
-    return metrics.rmse(metrics.colors(light), metrics.colors(reference))
+def light_errors(light: Pixels | None, reference: Reference) -> dict[str, Any]:
+    """Return the errors of light, as fields of a `Result`."""
+    if light is None or reference.light is None:
+        return {}
+    own, other = metrics.colors(light), metrics.colors(reference.light)
+    errors: dict[str, Any] = {"radiance_rmse": metrics.rmse(own, other)}
+    errors["relative_mse"] = metrics.relative_mse(own, other)
+    if reference.noise is not None:
+        errors["signed_map"] = metrics.signed_difference(own, other).astype(np.float16)
+    return errors
+
+
+def smallest_error(results: Sequence[Result]) -> float | None:
+    """Return the smallest relative mean square error of light, None if none is known."""
+    return min((r.relative_mse for r in results if r.relative_mse is not None), default=None)
 
 
 def not_finite_pixels(graph: Graph, arrays: Mapping[str, Pixels]) -> int:
@@ -286,6 +340,7 @@ OBJECTIVES: Mapping[str, Callable[[Result], float | None]] = {
     "flip": lambda result: result.metrics.flip,
     "rmse": lambda result: result.metrics.rmse,
     "radiance_rmse": lambda result: result.radiance_rmse,
+    "relative_mse": lambda result: result.relative_mse,
     "ms": lambda result: result.times.headline.median,
     "bytes": lambda result: result.allocated_bytes,
 }

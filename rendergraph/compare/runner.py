@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,14 +10,17 @@ from pathlib import Path
 from typing import Any, Literal
 
 from rendergraph.compare.batches import MOST_RUNS, Batch, batches, group_similar
+from rendergraph.compare.fingerprint import run_key
 from rendergraph.compare.prepare import Prepared, Run, SweepOptions
 from rendergraph.compare.results import (
     Comparison,
     Reference,
     Result,
+    TwinError,
     objective_values,
     pareto_front,
     passes,
+    smallest_error,
     typed_settings,
 )
 from rendergraph.compare.store import (
@@ -39,8 +43,10 @@ from rendergraph.compare.tasks import (
     TimingResult,
     VariantTask,
 )
+from rendergraph.compare.truth import TruthTask, TwinResult, TwinTask, noise_note, representatives
 from rendergraph.errors import Problem, RendergraphError
 from rendergraph.farm import Executor, Handle, TaskFailed, TaskFinished, TaskOutput, TaskRetried
+from rendergraph.session.progress import report_progress
 
 
 class Runner:
@@ -55,6 +61,7 @@ class Runner:
         self.reference: Reference | None = prepared.picture
         self.device: Mapping[str, object] = {}
         self.warnings: list[Problem] = []
+        self.twins: dict[int, list[TwinResult]] = {}
         self._handle: Handle | None = None
         self._waiting: list[list[int]] = []
         self._outputs = 0
@@ -65,6 +72,8 @@ class Runner:
 
     def execute(self, farm: Executor, progress: Callable[[int, int], None]) -> None:
         self._waiting = self._groups(self.missing, farm.workers)
+        if self.prepared.truth is not None:
+            self.reference = self._draw_truth(farm, self.prepared.truth)
         if self.reference is not None:
             self._distribute(farm, self.reference)
         elif self.prepared.other is not None or 0 in self.results:
@@ -84,10 +93,36 @@ class Runner:
                 self._task_event(farm, event)
             progress(*self._progress())
 
+    def _draw_truth(self, farm: Executor, truth: Run) -> Reference:
+        """Return the truth as a reference, once it is exact enough for all that is measured against it."""
+        found: Reference | None = None
+        farm.submit(
+            TruthTask(
+                name=truth.name,
+                key=run_key(truth.planned, truth.frame, ""),
+                truth=truth.for_task(),
+                base=self.prepared.runs[0].for_task(),
+                runs=tuple(run.for_task() for run in representatives(self.prepared.runs)),
+                encoding=self.prepared.encoding,
+                limits=self.options.limits,
+            )
+        )
+        with report_progress(self.options.progress is True, "% of the reference") as tell:
+            for event in farm.events():
+                if not isinstance(event, TaskOutput):
+                    self._task_event(farm, event)
+                elif isinstance(event.value, ReferenceResult):
+                    found, self.device = event.value.reference, event.value.origin["device"]
+                else:
+                    tell(round(100 * event.value), 100)
+        assert found is not None  # a task that fails raises
+        return found
+
     def comparison(self, *, warnings: Sequence[Problem]) -> Comparison:
         assert self.reference is not None
         base, linked = self.prepared.base, self.prepared.runs[0].planned.linked
-        results = tuple(self.results[number] for number in sorted(self.results))
+        results = tuple(self._with_errors(number) for number in sorted(self.results))
+        noisy = noise_note(self.reference, smallest_error(results), self.options.limits)
         more = [problem for result in results for problem in result.warnings]
         return Comparison(
             results=results,
@@ -99,17 +134,27 @@ class Runner:
             frame=self.options.frame,
             metric=self.options.metric,
             device=self.device,
-            notes=self.prepared.notes,
+            notes=(*self.prepared.notes, *([noisy] if noisy else [])),
             warnings=tuple(dict.fromkeys([*self.warnings, *warnings, *more])),
         )
+
+    def _with_errors(self, number: int) -> Result:
+        """Return a result with the errors that twins leave, the smallest first."""
+        result, errors = self.results[number], []
+        for one in self.twins.get(number, ()):
+            left = one.relative_mse if math.isfinite(one.relative_mse) else None
+            reduction = 1 - left / result.relative_mse if left is not None and result.relative_mse else None
+            errors.append(TwinError(one.twin.node, one.twin.type, one.twin.twin, left, reduction))
+        errors.sort(key=lambda error: math.inf if error.relative_mse is None else error.relative_mse)
+        return replace(result, error_by=tuple(errors))
 
     def _groups(self, numbers: Sequence[int], workers: int) -> list[list[int]]:
         """Return the runs of each task: in this process all of them, to measure them in turns."""
         return [list(numbers)] if workers == 1 else [[number] for number in numbers]
 
     def _progress(self) -> tuple[int, int]:
-        """Return the number of outputs so far, and of all: two for each run."""
-        total = 2 * len(self.prepared.runs)
+        """Return the number of outputs so far, and of all: two for each run, and one for each twin."""
+        total = 2 * len(self.prepared.runs) + len(self.prepared.twins)
         return min(self._outputs, total), total
 
     def _submit(self, farm: Executor, numbers: Sequence[int]) -> None:
@@ -132,6 +177,9 @@ class Runner:
         waiting, self._waiting = self._waiting, []
         for numbers in waiting:
             self._submit(farm, numbers)
+        for twin in self.prepared.twins:
+            own = replace(twin, run=twin.run.for_task())
+            farm.submit(TwinTask(name=own.run.name, needs=(self._handle,), twin=own))
 
     def _take(self, farm: Executor, output: Any, worker: str) -> None:
         """Store an output of a task; a task that was begun again yields some of them twice."""
@@ -147,6 +195,8 @@ class Runner:
                 self._rendered(output)
         elif isinstance(output, TimingResult):
             self._timed(output, worker)
+        elif isinstance(output, TwinResult):
+            self.twins.setdefault(output.twin.number, []).append(output)
 
     def _rendered(self, output: RenderedResult) -> None:
         run = self.prepared.runs[output.number]
@@ -157,7 +207,11 @@ class Runner:
         self.results[output.number] = replace(self.results[output.number], times=output.times)
 
     def _task_event(self, farm: Executor, event: TaskFinished | TaskRetried | TaskFailed) -> None:
-        if isinstance(event, TaskFailed):
+        if isinstance(event, TaskFailed) and isinstance(event.task, TwinTask):
+            twin = event.task.twin
+            self.twins.setdefault(twin.number, []).append(TwinResult(twin, math.nan))
+            self.warnings += [problem.as_warning() for problem in event.problems]
+        elif isinstance(event, TaskFailed):
             raise type(event.error)(event.error.problems) from event.error
 
 
@@ -250,7 +304,9 @@ class SweepRunner(Runner):
         }
         values = {number: objective_values(result, self.options.best) for number, result in rendered.items()}
         kept = set(pareto_front({number: own for number, own in values.items() if own is not None}))
-        if self.prepared.other is None and (self.reference is None or self.reference.kind == "variant"):
+        if (self.prepared.other or self.prepared.truth) is None and (
+            self.reference is None or self.reference.kind == "variant"
+        ):
             kept.add(0)
         return set(rendered) - kept
 

@@ -58,6 +58,7 @@ class RunRecord(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     psnr: Annotated[float | None, Meta(description="Peak signal to noise, in dB; null where pictures are equal.")]
     ssim: Annotated[float | None, Meta(description="Structural similarity: 1 is equal.")]
     radiance_rmse: Annotated[float | None, Meta(description="Error of scene-linear light, where both have it.")]
+    relative_mse: Annotated[float | None, Meta(description="Relative mean square error of that light.")] = None
     not_finite: Annotated[Count, Meta(description="Pixels that are NaN or infinite.")]
     figures: Annotated[dict[str, Any], Meta(description="Outputs of one texel: a number, or one a channel.")] = {}
     plugin_metrics: Annotated[dict[str, float | None], Meta(description="Metrics of plugins.")] = {}
@@ -326,6 +327,7 @@ def restored_result(run: Run, record: RunRecord, encoding: Encoding) -> Result:
         times=record.times,
         settings=run.settings,
         radiance_rmse=record.radiance_rmse,
+        relative_mse=record.relative_mse,
         not_finite=record.not_finite,
         figures=record.figures,
     )

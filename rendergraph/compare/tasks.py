@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 
 from rendergraph.compare.batches import Batch, fitting_batches, measure_batch, node_types, render_batch
+from rendergraph.compare.light import LIGHT, with_light
 from rendergraph.compare.prepare import Run
 from rendergraph.compare.results import (
     Difference,
     Pixels,
     Reference,
-    light_error,
+    light_errors,
     machine,
     measure_against,
     not_finite_pixels,
@@ -114,7 +115,8 @@ class VariantTask(Task):
         runs: list[tuple[Run, Planned]] = []
         for run in self.runs:
             try:
-                runs.append((run, run.plan(worker, runs[-1][1].linked.catalog if runs else None)))
+                planned_run = run.plan(worker, runs[-1][1].linked.catalog if runs else None)
+                runs.append((run, with_light(planned_run, run.light)))
             except InputError as error:
                 if not self.needs:
                     raise
@@ -153,11 +155,11 @@ class VariantTask(Task):
             run, own = runs[place]
             if reference is None:
                 reference = _reference(run, arrays, self.encoding)
-                yield ReferenceResult(reference, _origin(worker))
+                yield ReferenceResult(reference, origin_of(worker))
             yield _rendered(run, own, arrays, reference, worker, encode=True)
         warm = bool(unrendered)
         for place, times in measure_batch(worker.gpu, planned, batch, self.frames, self.repeats, warm=warm):
-            yield TimingResult(runs[place][0].number, times, _origin(worker))
+            yield TimingResult(runs[place][0].number, times, origin_of(worker))
         yield PassCount(batch.pass_count)
 
 
@@ -172,14 +174,15 @@ class ComparisonTask(VariantTask):
         planned = [run.plan(worker) for run in self.runs]
         reference = self.reference(worker)
         for run, each in zip(self.runs, planned, strict=True):
-            frame = stages.draw_last(each.for_frames(range(1, self.frame + 1)), worker.gpu)
+            lit = with_light(each, run.light)  # measured without: another output needs memory
+            frame = stages.draw_last(lit.for_frames(range(1, self.frame + 1)), worker.gpu)
             if reference is None:
                 reference = _reference(run, frame.arrays, self.encoding)
-                yield ReferenceResult(reference, _origin(worker))
-            rendered = _rendered(run, each, frame.arrays, reference, worker, warnings=frame.warnings)
+                yield ReferenceResult(reference, origin_of(worker))
+            rendered = _rendered(run, lit, frame.arrays, reference, worker, warnings=frame.warnings)
             yield replace(rendered, measured={**rendered.measured, **self._difference(run, each, worker)})
         for run, each, times in zip(self.runs, planned, _take_turns(worker.gpu, planned, self.frames), strict=True):
-            yield TimingResult(run.number, times_of(times, node_types(each)), _origin(worker))
+            yield TimingResult(run.number, times_of(times, node_types(each)), origin_of(worker))
 
     def _difference(self, run: Run, planned: Planned, worker: Worker) -> dict[str, Any]:
         graph, key = planned.linked.graph, ("outputs", self.base.digest, self.frame)
@@ -206,7 +209,7 @@ class ReferenceTask(Task):
     def run(self, worker: Worker) -> Iterator[ReferenceResult]:
         planned = self.base.plan(worker)
         frame = stages.draw_last(planned.for_frames(range(1, self.frame + 1)), worker.gpu)
-        yield ReferenceResult(_reference(self.base, frame.arrays, self.encoding, self.kind), _origin(worker))
+        yield ReferenceResult(_reference(self.base, frame.arrays, self.encoding, self.kind), origin_of(worker))
 
 
 def _reference(
@@ -235,12 +238,12 @@ def _rendered(
         "encoding": reference.encoding,
         "metrics": errors,
         "flip_map": flip_map,
-        "radiance_rmse": light_error(arrays.get("radiance"), reference.light),
+        **light_errors(arrays.get(LIGHT, arrays.get("radiance")), reference),
         "not_finite": not_finite_pixels(graph, arrays),
         "figures": figures_of(arrays),
     }
     picture = _encoded(run, graph, pixels) if encode else b""
-    return RenderedResult(run.number, measured, picture, _origin(worker), warnings)
+    return RenderedResult(run.number, measured, picture, origin_of(worker), warnings)
 
 
 def _encoded(run: Run, graph: Graph, pixels: Pixels) -> bytes:
@@ -262,7 +265,7 @@ def _take_turns(gpu: Gpu, planned: Sequence[Planned], frames: int) -> list[list[
     return times
 
 
-def _origin(worker: Worker) -> Origin:
+def origin_of(worker: Worker) -> Origin:
     if "origin" not in worker.cache:
         worker.cache["origin"] = {"device": worker.gpu.device.as_json(), "machine": machine()}
     origin: Origin = worker.cache["origin"]

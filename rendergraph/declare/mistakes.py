@@ -111,7 +111,12 @@ def _names(cls: type[Node], lenient: bool) -> Iterator[Problem]:
             yield _problem(group, f"group '{group}' has the name of a port or parameter")
     inherited = {name for base in cls.__mro__[1:] if issubclass(base, Node) for name in base.ports()}
     for name, value in vars(cls).items():
-        if value is None and name not in ("shader", "twin") and name[0] != "_" and name not in {*inherited, *parameters}:
+        if (
+            value is None
+            and name not in ("shader", "twin")
+            and name[0] != "_"
+            and name not in {*inherited, *parameters}
+        ):
             yield _problem(name, f"'{name}' is None, which drops a port that a base declares; none declares '{name}'")
     shader = cls.shader
     if shader is not None and (not isinstance(shader, str) or not shader.endswith((".frag", ".comp"))):

@@ -25,5 +25,6 @@ from rendergraph.images.saving import stands_for as stands_for
 from rendergraph.images.saving import viewable_as as viewable_as
 from rendergraph.images.viewable import from_srgb as from_srgb
 from rendergraph.images.viewable import heat_map as heat_map
+from rendergraph.images.viewable import signed_map as signed_map
 from rendergraph.images.viewable import to_srgb as to_srgb
 from rendergraph.images.viewable import viewable as viewable

@@ -69,6 +69,18 @@ def heat_map(values: Pixels) -> Bytes:
     return np.asarray(mixed + 0.5).astype(np.uint8)
 
 
+def signed_map(values: Pixels) -> Bytes:
+    """Values -1…1 as colours: blue below 0, black at 0, orange above; NaN is magenta.
+
+    Colours grow with the square root of a value, so that small differences can be seen.
+    """
+    amount = np.sqrt(np.clip(np.abs(np.nan_to_num(values, nan=0.0)), 0, 1))[..., np.newaxis]
+    low, high = (np.array(color, np.float64) for color in ((90, 160, 255), (255, 150, 50)))
+    colors = np.where(values[..., np.newaxis] < 0, low, high) * amount
+    colors[np.isnan(values)] = _NAN_COLOR
+    return np.asarray(colors + 0.5).astype(np.uint8)
+
+
 def viewable(array: Pixels, semantic: str = "any", encoding: str | None = None) -> Bytes:
     """Return a picture of a texture, uint8 with one or three channels; the module's table lists how it is shown.
 

@@ -16,7 +16,7 @@ from rendergraph.images import PictureInfo, channel_names
 from rendergraph.installed import versions
 from rendergraph.scene import animate
 from rendergraph.scene.cameras import view_matrices
-from rendergraph.scene.model import Camera
+from rendergraph.scene.model import Camera, Scene
 from rendergraph.session.frame import Frame, OutputInfo
 from rendergraph.session.gpu import Gpu
 from rendergraph.session.picture_metadata import frame_metadata, pipeline_metadata
@@ -44,6 +44,7 @@ class Drawing(Struct, eq=False, dict=True):
     times: list[FrameTimes] = field(default_factory=list)
     number: int = 0
     camera: Camera | None = None
+    _held: tuple[int, Scene] | None = None
 
     def __post_init__(self) -> None:
         options = self.expanded.options
@@ -88,13 +89,18 @@ class Drawing(Struct, eq=False, dict=True):
         self.number = number
 
     def _draw(self, number: int, camera: Camera | None = None) -> FrameTimes:
-        linked, fps = self.expanded.linked, self.expanded.options.fps
-        time, scene = (number - 1) / fps, linked.scene
+        linked, fps, still = self.expanded.linked, self.expanded.options.fps, self.expanded.options.still
+        moment = number if still is None else min(number, still)
+        time, scene = (moment - 1) / fps, linked.scene
         if self.runner.drawn:
             self.scene.advance()
         if animate.moves(scene):
-            scene = animate.at(scene, time)
-            self.scene.update(scene)
+            if (
+                still is None or self._held is None or self._held[0] != moment
+            ):  # else nothing has moved, nor may seem to
+                self._held = moment, animate.at(scene, time)
+                self.scene.update(self._held[1])
+            scene = self._held[1]
         if not self.runner.drawn:
             self.scene.advance()  # the first frame has no motion
         self.camera = camera or scene.cameras[linked.selection.camera or next(iter(scene.cameras))]

@@ -105,6 +105,7 @@ class RenderKeywords(TypedDict, total=False):
     timed: bool
     reuse: bool | None
     cull: bool
+    still: int | None
 
 
 class RenderOptions(Struct, frozen=True):
@@ -124,6 +125,7 @@ class RenderOptions(Struct, frozen=True):
         reuse: skip steps whose results are unchanged since the previous frame; by default unless steps are timed, as
             skipped steps take no time. No bit of a picture depends on it.
         cull: skip objects outside the view that they would be rendered with. No bit of a picture depends on it.
+        still: a frame after which the scene, the camera and the time stay as they are, so that pictures accumulate.
     """
 
     frames: range = range(1, 2)
@@ -138,6 +140,7 @@ class RenderOptions(Struct, frozen=True):
     timed: bool = False
     reuse: bool | None = None
     cull: bool = True
+    still: int | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.frames, range) or not self.frames or min(self.frames[0], self.frames[-1]) < 1:

@@ -39,6 +39,7 @@ COLUMNS = (
     Column("psnr", "number", "Peak signal to noise; empty where pictures are equal.", lambda r: r.metrics.psnr, "dB"),
     Column("ssim", "number", "Structural similarity: 1 is equal.", lambda r: r.metrics.ssim),
     Column("radiance_rmse", "number", "Error of scene-linear light, where both have it.", lambda r: r.radiance_rmse),
+    Column("relative_mse", "number", "Relative mean square error of that light.", lambda r: r.relative_mse),
     Column("gpu_ms", "number", "Time on the GPU, the median of all frames.", _spread("gpu_ms", "median"), "ms"),
     Column("gpu_ms_p10", "number", "Its tenth percentile.", _spread("gpu_ms", "p10"), "ms"),
     Column("gpu_ms_p90", "number", "Its ninetieth percentile.", _spread("gpu_ms", "p90"), "ms"),

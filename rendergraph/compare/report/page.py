@@ -17,7 +17,7 @@ from rendergraph.compare.report.html import (
     software_note,
     table,
 )
-from rendergraph.compare.report.pictures import first_differences, sheet, viewer
+from rendergraph.compare.report.pictures import first_differences, sheet, signed_sheet, viewer
 from rendergraph.compare.report.scatter import Point, scatter_svg
 from rendergraph.compare.results import Comparison, Result, Search, machine, pareto
 from rendergraph.diagrams import lifetimes_svg
@@ -50,6 +50,7 @@ def comparison_page(comparison: Comparison, command: str, *, title: str = "", no
         sections = [
             section("summary", "Summary", summary, software_note(comparison.software)),
             pictures,
+            section("light", "Light against the truth", *_light(comparison)),
             section("first", "First difference", first_differences(comparison)),
             section("times", "Times", *_times(comparison, comparison.results[:MOST_COLUMNS], ())),
             section("structure", "Structure", _structure(comparison)),
@@ -80,6 +81,7 @@ def sweep_page(sweep: Sweep, command: str, *, title: str = "", note: str = "") -
         section("search", "Search", _search(sweep.search) if sweep.search else ""),
         section("summary", "Runs", _summary(comparison, front=front), failed, software_note(comparison.software)),
         section("pictures", "Pictures", viewer(comparison), sheet(comparison, MOST_COLUMNS)),
+        section("light", "Light against the truth", *_light(comparison)),
         section("times", "Times", *_times(comparison, best, front), best_words),
         section("memory", "Memory", _memory(best)),
     ]
@@ -159,7 +161,7 @@ def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
     whole = any(result.times.frame_ms for result in comparison.results)
     light = any(result.radiance_rmse is not None for result in comparison.results)
     heads = ["", "#FLIP", "#RMSE", "#PSNR dB", "#SSIM", *(f"#{escape(name)}" for name in more)]
-    heads += ["#light RMSE"] if light else []
+    heads += ["#light RMSE", "#rel. MSE"] if light else []
     again = measured and any(result.times.repeated for result in comparison.results)
     if measured:
         times_heads = ["#GPU ms", *(["#repeats"] if again else []), "#CPU ms", *(["#frame ms"] if whole else [])]
@@ -185,7 +187,7 @@ def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
             _cell(number(m.ssim)),
             *(_cell(number(result.columns.get(name))) for name in more),
         ]
-        cells += [_cell(number(result.radiance_rmse))] if light else []
+        cells += [_cell(number(result.radiance_rmse)), _cell(number(result.relative_mse))] if light else []
         if measured:
             cells += [milliseconds(times.gpu_ms, most if times.gpu_ms else 0)]
             if again:
@@ -263,6 +265,41 @@ def quality_svg(comparison: Comparison, front: Sequence[Result] = ()) -> str:
     kind = "GPU" if results[0].times.gpu_ms else "frame"
     note = ", software rasteriser" if comparison.software else ""
     return scatter_svg(points, f"{kind} time, ms{note}", f"FLIP against {comparison.reference.name}")
+
+
+def _light(comparison: Comparison) -> tuple[str, str, str]:
+    """Return the noise of a truth, where light is too dark or too bright, and which techniques cause the error."""
+    reference, share = comparison.reference, comparison.noise_share
+    if reference.noise is None:
+        return "", "", ""
+    part = f", which is {number(100 * share, 2)} % of the smallest error" if share is not None else ""
+    noise = (
+        f"<p>Light is measured before bloom and display, against {reference.samples} samples of each pixel of "
+        f"<code>{escape(reference.name)}</code>. Their own noise adds {number(reference.noise)} to each relative mean "
+        f"square error{part}.</p>"
+    )
+    return noise, signed_sheet(comparison, MOST_COLUMNS), _error_by(comparison)
+
+
+def _error_by(comparison: Comparison) -> str:
+    rows, causes = [], []
+    for result in comparison.results:
+        most = result.relative_mse or 0.0
+        for place, one in enumerate(result.error_by):
+            left, cut = one.relative_mse, one.reduction
+            bar = f'<span class="bar" style="width:{100 * min(1.0, left / most):.1f}%"></span>' if left and most else ""
+            rows.append(
+                f'<tr><th scope="row">{escape(result.name if place == 0 else "")}</th>'
+                f"<td>{escape(one.node)}</td><td>{escape(one.type)}</td><td>{escape(one.twin)}</td>"
+                f'<td class="num">{number(left)}{bar}</td>{_cell("–" if cut is None else f"{100 * cut:+.1f} %")}</tr>'
+            )
+            if place == 0 and cut is not None and cut > 0:
+                causes.append(f"Most of the error of {result.name} ({number(most)}) comes from {one.node}.")
+    if not rows:
+        return ""
+    words = f"<p>{escape(' '.join(causes))} Each technique was replaced by its exact twin in turn.</p>"
+    heads = ["", "technique", "type", "twin", "#rel. MSE with the twin", "#reduction"]
+    return "<h3>Where the error comes from</h3>" + words + table(heads, rows, "Error with each technique's twin")
 
 
 def _structure(comparison: Comparison) -> str:

@@ -6,7 +6,7 @@ from html import escape
 
 from rendergraph.compare.report.html import eight_bit, number, png
 from rendergraph.compare.results import Comparison
-from rendergraph.images import heat_map, viewable
+from rendergraph.images import heat_map, signed_map, viewable
 
 
 def _pictures(comparison: Comparison) -> list[tuple[str, str]]:
@@ -80,6 +80,21 @@ def sheet(comparison: Comparison, most: int) -> str:
 def _figure(identity: str, source: str, caption: str) -> str:
     own, alt = f' id="{identity}"' if identity else "", escape(caption)
     return f'<figure><img{own} src="{source}" alt="{alt}"><figcaption>{alt}</figcaption></figure>'
+
+
+def signed_sheet(comparison: Comparison, most: int) -> str:
+    """Return the signed difference of each variant's light to a truth, with the mean; empty without a truth."""
+    figures = []
+    for result in comparison.results[:most]:
+        if result.signed_map is not None:
+            values = result.signed_map.astype("f4")
+            dark, bright = (float((values < 0).mean()), float((values > 0).mean()))
+            caption = f"{result.name}: {100 * dark:.0f} % of the pixels too dark, {100 * bright:.0f} % too bright"
+            figures.append(_figure("", png(signed_map(values)), caption))
+    if not figures:
+        return ""
+    note = f"Blue is darker than {escape(comparison.reference.name)}, orange is brighter, and black is equal."
+    return f'<div class="sheet">{"".join(figures)}</div><p class="quiet">{note}</p>'
 
 
 def first_differences(comparison: Comparison) -> str:

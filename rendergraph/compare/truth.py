@@ -1,0 +1,266 @@
+"""The truth as a reference: a pipeline whose mean grows more exact from frame to frame, and says how exact it is.
+
+Such a pipeline has the outputs `radiance`, the mean so far, and `variance`, that of this mean; `samples_taken` counts
+the samples of each pixel. The truth is drawn until its own noise is a small part of the smallest error that it is to
+measure. Noise and errors are relative mean square errors of the light, so they can be compared and subtracted: the
+error that is measured is the sum of both.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import math
+import os
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.compare.light import LIGHT, displayed, with_light
+from rendergraph.compare.prepare import Run, TruthLimits, Twin
+from rendergraph.compare.results import Reference
+from rendergraph.compare.tasks import ReferenceResult, origin_of
+from rendergraph.errors import RenderError
+from rendergraph.farm import Handle, Task, Worker
+from rendergraph.images.files import write_file
+from rendergraph.metrics import Encoding, colors, relative_mse, relative_noise
+from rendergraph.session import RenderOptions, stages
+
+if TYPE_CHECKING:
+    from rendergraph.session.gpu import Gpu
+    from rendergraph.session.values import Planned
+
+    Pixels = npt.NDArray[Any]
+
+TWIN_FRAMES = 16
+"""Frames whose mean is a twin's light: a traced twin is noisy in a single one."""
+_LEAST_FRAMES = 2
+"""In one frame, pixels whose few samples are all alike seem to have no variance."""
+_MOST_CACHED = 1 << 30
+"""Bytes of all truths on the disk; those used longest ago are removed."""
+_MOST_LIGHTS = 512 << 20
+"""Bytes of the light of runs that are drawn beforehand, to know the smallest error."""
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """The light, (height, width, 3), the variance of each of its values, the samples of a pixel, and the time taken."""
+
+    radiance: npt.NDArray[np.float32]
+    variance: npt.NDArray[np.float32]
+    samples: int
+    seconds: float
+
+    @property
+    def noise(self) -> float:
+        """The relative mean square error that the light has by its variance; NaN if a value is not finite."""
+        return relative_noise(self.variance, self.radiance)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TruthTask(Task):
+    """Draw the truth: yields the completed part, 0…1, now and then, and at last the reference.
+
+    Attributes:
+        key: what decides the truth, besides the number of samples.
+        truth, base: the pipeline of the truth, and the one whose display chain makes the picture.
+        runs: what is measured against it.
+    """
+
+    name: str
+    key: str
+    truth: Run
+    base: Run
+    runs: tuple[Run, ...]
+    encoding: Encoding
+    limits: TruthLimits
+
+    def run(self, worker: Worker) -> Iterator[float | ReferenceResult]:
+        planned, frame = self.truth.plan(worker), self.truth.frame
+        lights = [_light(worker.gpu, run.plan(worker), run) for run in self.runs]
+        stored = _load(self.key)
+        found = stored if stored is not None and _is_enough(stored, lights, self.limits) else None
+        if found is None:
+            for each in draw_truth(worker.gpu, planned, frame, lights, self.limits):
+                if isinstance(each, Truth):
+                    found = each
+                else:
+                    yield each
+            assert found is not None  # it comes last
+            _save(self.key, found)
+        base = self.base.plan(worker)
+        assert self.base.light is not None
+        pixels = displayed(worker.gpu, base, self.base.light, found.radiance, self.base.output, frame)
+        reference = Reference(
+            name=self.truth.name,
+            kind="pipeline",
+            pixels=pixels,
+            encoding=self.encoding,
+            output=self.base.output,
+            light=found.radiance,
+            noise=found.noise,
+            samples=found.samples,
+        )
+        yield ReferenceResult(reference, origin_of(worker))
+
+
+@dataclass(frozen=True, eq=False)
+class TwinResult:
+    """The error of a run's light with the twin in place of one of its techniques; NaN where it cannot be drawn."""
+
+    twin: Twin
+    relative_mse: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TwinTask(Task):
+    name: str
+    needs: tuple[Handle, ...]
+    twin: Twin
+
+    def run(self, worker: Worker) -> Iterator[TwinResult]:
+        reference, run = worker.value(self.needs[0]), self.twin.run
+        light = _light(worker.gpu, run.plan(worker), run, frames=TWIN_FRAMES)
+        yield TwinResult(self.twin, relative_mse(light, reference.light))
+
+
+def representatives(runs: Sequence[Run]) -> tuple[Run, ...]:
+    """Return the runs whose light is drawn before the truth: all, or as many as fit, evenly spaced."""
+    width, height = runs[0].planned.linked.graph.size
+    most = max(1, _MOST_LIGHTS // (12 * width * height))
+    return tuple(runs[:: math.ceil(len(runs) / most)])
+
+
+def draw_truth(
+    gpu: Gpu, planned: Planned, frame: int, lights: Sequence[Pixels], limits: TruthLimits
+) -> Iterator[float | Truth]:
+    """Draw a truth of the scene at a frame's time; yield the completed part now and then, and at last the truth.
+
+    Args:
+        gpu: where to draw; nothing else may be drawn there meanwhile.
+        planned: the pipeline of the truth.
+        frame: the frame whose scene is drawn again and again; frame numbers continue, so samples differ.
+        lights: what will be measured against it, (height, width, channels) each.
+        limits: when it is exact enough.
+    """
+    names = tuple(name for name in ("radiance", "variance", "samples_taken") if name in planned.linked.graph.outputs)
+    options = RenderOptions(frames=range(frame, frame + 1), still=frame, outputs=names)
+    begun = time.monotonic()
+    with gpu.current():
+        drawing = stages.compile(stages.expand(planned.linked, options), gpu)
+        drawing.begin(lead=0)
+    due, share = 1, 0.0
+    for drawn in itertools.count(1):
+        with gpu.current():
+            drawing.draw(frame + drawn - 1)
+        seconds = time.monotonic() - begun
+        if drawn < due and seconds < limits.seconds:
+            yield min(1.0, max(share * drawn / due, seconds / limits.seconds))
+            continue
+        with gpu.current():
+            truth = _truth(drawing.read().arrays, drawn, seconds)
+        if truth.samples >= limits.most_samples or seconds >= limits.seconds or not math.isfinite(truth.noise):
+            break
+        wanted = limits.noise * _smallest_error(truth, lights)
+        if drawn >= _LEAST_FRAMES and truth.noise <= wanted:
+            break
+        left = truth.noise / wanted if wanted > 0 else math.inf  # noise falls as the number of samples grows
+        left = min(2.0, left, limits.most_samples / max(1, truth.samples))
+        due = max(drawn + 1, math.ceil(drawn * left))
+        share = min(1.0, max(wanted / truth.noise if truth.noise > 0 else 0.0, truth.samples / limits.most_samples))
+        share = min(1.0, share * due / drawn)
+    yield truth
+
+
+def _truth(arrays: Any, frames: int, seconds: float) -> Truth:
+    counts = arrays.get("samples_taken")
+    radiance, variance = (colors(arrays[name]).astype(np.float32) for name in ("radiance", "variance"))
+    return Truth(radiance, variance, frames if counts is None else round(float(counts[..., 0].mean())), seconds)
+
+
+def _smallest_error(truth: Truth, lights: Sequence[Pixels]) -> float:
+    return min((relative_mse(light, truth.radiance) for light in lights), default=0.0)
+
+
+def _is_enough(truth: Truth, lights: Sequence[Pixels], limits: TruthLimits) -> bool:
+    if not lights or truth.radiance.shape[:2] != lights[0].shape[:2]:
+        return False
+    if truth.samples >= limits.most_samples or truth.seconds >= limits.seconds:
+        return True
+    return truth.noise <= limits.noise * _smallest_error(truth, lights)
+
+
+def _light(gpu: Gpu, planned: Planned, run: Run, frames: int = 1) -> Pixels:
+    """Return the light of a run's frame; the mean of several frames, in which the scene is as in the first one."""
+    linked = with_light(planned, run.light).linked
+    last = run.frame + frames - 1
+    options = RenderOptions(frames=range(run.frame, last + 1), still=run.frame, outputs=(LIGHT,))
+    total: Any = 0.0
+    for frame in stages.draw(stages.expand(linked, options), gpu):
+        total = total + colors(frame[LIGHT])
+    return np.asarray(total / frames)
+
+
+# --- the cache on the disk -------------------------------------------------------------------------------------------
+
+
+def cache_folder() -> Path:
+    """Return the folder of cached truths: in `RENDERGRAPH_CACHE`, or in the user's folder for caches."""
+    named = os.environ.get("RENDERGRAPH_CACHE")
+    base = Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "rendergraph"
+    return base / "truths"
+
+
+def _load(key: str) -> Truth | None:
+    """Return the cached truth; None where there is none, or none that can be read."""
+    path = cache_folder() / f"{key}.npz"
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            truth = Truth(stored["radiance"], stored["variance"], int(stored["samples"]), float(stored["seconds"]))
+        os.utime(path)
+    except (OSError, ValueError, KeyError, EOFError):
+        return None
+    return truth
+
+
+def _save(key: str, truth: Truth) -> None:
+    """Cache a truth; a disk that is full or cannot be written to costs only the time to draw it again."""
+    import io
+
+    data = io.BytesIO()
+    np.savez(
+        data,
+        radiance=truth.radiance,
+        variance=truth.variance,
+        samples=np.int64(truth.samples),
+        seconds=np.float64(truth.seconds),
+    )
+    folder = cache_folder()
+    with contextlib.suppress(OSError, RenderError):
+        folder.mkdir(parents=True, exist_ok=True)
+        write_file(folder / f"{key}.npz", data.getvalue())
+        files = sorted(folder.glob("*.npz"), key=lambda path: path.stat().st_mtime, reverse=True)
+        total = 0
+        for file in files:
+            total += file.stat().st_size
+            if total > _MOST_CACHED:
+                file.unlink()
+
+
+def noise_note(reference: Reference, smallest: float | None, limits: TruthLimits) -> str | None:
+    """Return a sentence about a truth that is noisier than wanted, None if it is exact enough."""
+    noise = reference.noise
+    if noise is None or smallest is None or noise <= limits.noise * smallest:
+        return None
+    if not math.isfinite(noise):
+        return f"'{reference.name}' holds NaN or infinity, so its noise is unknown"
+    part = (
+        f"{100 * noise / smallest:.0f} % of the smallest error" if smallest > 0 else "not below the smallest error, 0"
+    )
+    more = "--reference-seconds or --reference-samples draws more"
+    return f"the noise of '{reference.name}' after {reference.samples} samples is {part}; a larger {more}"
