@@ -96,6 +96,7 @@ def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio)
         f"`{found.name}`",
         f"*{found.family}* — {prose(first)}",
         prose(rest.strip()),
+        f"Its exact twin, with the same outputs, is [`{node['twin']}`]({node['twin']}.md)." if node["twin"] else "",
         _extends(found),
         _pictures(found, node["outputs"], studio),
         f"## In a file\n\n{block(example_text(found, catalog()), 'yaml')}",

@@ -323,6 +323,8 @@ def test_the_wrong_line_of_a_page_prints_its_message(cli: Any, tmp_path: Path, p
         pytest.skip("needs a full disk or a mistake of ours; tested elsewhere")
     outputs = "{image: null, radiance: null, ao: display.color}"
     (tmp_path / "occlusion.yaml").write_text(f"extends: forward\noutputs: {outputs}\n")
+    outputs = "{image: null, variance: light.radiance}"
+    (tmp_path / "truth.yaml").write_text(f"extends: forward\noutputs: {outputs}\n")
     images.write(tmp_path / "photo.png", np.zeros((2, 2, 3), np.uint8))
     *before, wrong = (shlex.split(line, comments=True)[1:] for line in page["wrong"].splitlines())
     for words in before:
