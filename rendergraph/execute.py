@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from time import perf_counter
 from typing import Annotated, Any, Optional, TypeAlias
 
@@ -12,11 +13,20 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Struct, field
 
-from rendergraph.compile import Executable
+from rendergraph.compile import SCENE_CHANGES, Executable
 from rendergraph.declare import Node, Port, Views
 from rendergraph.declare.blame import author_problem
 from rendergraph.document import shown
-from rendergraph.errors import InputError, Misuse, Problem, RenderError, SceneError, is_interruption, node_named
+from rendergraph.errors import (
+    InputError,
+    Misuse,
+    Problem,
+    RenderError,
+    SceneError,
+    is_interruption,
+    node_named,
+    suggestion,
+)
 from rendergraph.expand import CAMERA
 from rendergraph.gl import textures
 from rendergraph.gl.queries import Timer
@@ -26,16 +36,20 @@ from rendergraph.ports import Count
 from rendergraph.projection import shifted
 from rendergraph.scene.facts import FrameScene
 from rendergraph.scene.model import Scene
-from rendergraph.steps import Step, ViewMatrices
+from rendergraph.steps import Change, Step, UniformValue, ViewMatrices
 from rendergraph.steps.checks import buffer as buffer_of
 from rendergraph.steps.checks import check_argument, declared_port
+from rendergraph.steps.checks import uniform as uniform_of
 from rendergraph.steps.state import DepthBounds
 from rendergraph.textures import BufferDesc
-from rendergraph.typecheck import Range
+from rendergraph.typecheck import Range, quoted
 
 _Scissor: TypeAlias = Annotated[tuple[int, int, Count, Count], "x, y, width and height in texels"]
 _Part: TypeAlias = Annotated[float, Range(-1, 1)]
 _Offset: TypeAlias = Annotated[tuple[_Part, _Part], "x and y in texels, from -1 to 1"]
+
+
+_CHANGES = {"camera": "", **SCENE_CHANGES}
 
 
 class StepTime(Struct, frozen=True):
@@ -71,6 +85,8 @@ class FrameContext(Struct, eq=False):
     time: float
     camera: ViewMatrices
     scene: FrameScene
+    moved: Callable[[], bool]
+    is_first: bool
 
     def connected(self, port: Port) -> bool:
         return bool(self.node.inputs.get(declared_port(self.node.node.ports(), port, "connected's argument").name))
@@ -105,6 +121,26 @@ class FrameContext(Struct, eq=False):
         region = self.executable.memory.regions.get((self.node.id, number))
         if region is not None:  # else nobody reads what its steps make
             region.set(scissor, depth_bounds)
+
+    def set_uniform(self, name: str, value: UniformValue) -> None:
+        known = self.executable.uniforms.get(self.node.id, ())
+        if name not in known:
+            hint = suggestion(name, known) if known else ""
+            text = f"set_uniform is given {quoted(name)}, which is no parameter and no keyword of a step{hint}"
+            raise Misuse(text, "RG433")
+        mismatch = self.executable.set_uniform(self.node.id, name, uniform_of(name, value))
+        if mismatch is not None:
+            raise Misuse(f"set_uniform: {mismatch}", "RG433")
+
+    def changed(self, *what: Change) -> bool:
+        for word in what:
+            if word not in _CHANGES:
+                raise Misuse(f"changed is given {quoted(word)}{suggestion(str(word), _CHANGES, most=5)}", "RG433")
+        now, before = self.executable.scene.changes, self.executable.changes_seen
+        return self.is_first or any(
+            self.moved() if word == "camera" else now[_CHANGES[word]] != before.get(_CHANGES[word], 0)
+            for word in what or _CHANGES
+        )
 
     def write(self, port: Port, values: npt.NDArray[Any]) -> None:
         buffer_of(self.node.node.ports(), port, "write")
@@ -199,6 +235,7 @@ class Runner(Struct, eq=False):
         """
         executable, views = self.executable, self.executable.views
         start = perf_counter()
+        moved_from = self._seen
         self._count_still(scene, camera)
         if executable.reads_frame and views.set_frame(time, delta, index, self._still):
             executable.touched.add("frame_block")
@@ -211,9 +248,11 @@ class Runner(Struct, eq=False):
             self._scene, moved = FrameScene(scene, self._scene), True
         self._scene.scene = scene
         updates: dict[str, float] = {}
+        has_moved = partial(_has_moved, moved_from, self._seen)
         for node in self._updating:
             before = perf_counter()
-            frame = FrameContext(executable, self.graph, node, index, time, camera, self._scene)
+            first = self.drawn == 0
+            frame = FrameContext(executable, self.graph, node, index, time, camera, self._scene, has_moved, first)
             with _author_errors(node, "update"):
                 node.node.update(frame)  # pyright: ignore[reportArgumentType]  # a cached_property is one to mypy
             updates[node.id] = perf_counter() - before
@@ -295,11 +334,7 @@ class Runner(Struct, eq=False):
         """How many frames nothing has moved: neither scene nor camera, nor a parameter that was changed meanwhile."""
         before, self._seen = self._seen, (scene, camera)
         still = before is not None and before[0] is scene and not self.executable.fresh
-        if still and before is not None:
-            still = all(
-                np.array_equal(getattr(before[1], name), getattr(camera, name)) for name in ("view", "projection")
-            )
-        self._still = self._still + 1 if still else 0
+        self._still = self._still + 1 if still and not _has_moved(before, self._seen) else 0
 
     def _jittered(self, camera: ViewMatrices) -> ViewMatrices:
         """The camera with its picture moved as far as a node asks for."""
@@ -342,6 +377,13 @@ class Runner(Struct, eq=False):
         texture = executable.memory.texture(resource, self._parity)
         texels = textures.read(executable.device, texture, mip=mip, layer=layer, stencil=stencil)
         return texels[0] if desc.kind == "texture2d" or layer is not None else texels
+
+
+def _has_moved(before: tuple[Scene, ViewMatrices] | None, now: tuple[Scene, ViewMatrices] | None) -> bool:
+    """Whether the camera of two frames differs, but for its jitter."""
+    if before is None or now is None:
+        return True
+    return not all(np.array_equal(getattr(before[1], name), getattr(now[1], name)) for name in ("view", "projection"))
 
 
 def _view_makers(graph: Graph, node: GraphNode) -> Iterator[str]:

@@ -8,5 +8,15 @@ from rendergraph.compile.kept import KeptValues
 from rendergraph.compile.memory import TexturePool
 from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.steps import compile_plan
+from rendergraph.compile.uploads import SCENE_CHANGES
 
-__all__ = ["CompiledStep", "Executable", "GpuScene", "KeptValues", "ProgramCache", "TexturePool", "compile_plan"]
+__all__ = [
+    "SCENE_CHANGES",
+    "CompiledStep",
+    "Executable",
+    "GpuScene",
+    "KeptValues",
+    "ProgramCache",
+    "TexturePool",
+    "compile_plan",
+]

@@ -69,14 +69,14 @@ def _uniforms(
             guard = f"; not every material has it, so it stands inside #ifdef HAS_{name.upper()}" if slot else ""
             text = f"{files} samples '{name}', but the step reads no texture of that name; "
             code, text = "RG430", f"{text}it reads {', '.join(sorted(sampled)) or 'none'}{guard}"
-        elif not uniform.is_opaque and (mismatch := _mismatch(uniform, uniforms[name])) is not None:
+        elif not uniform.is_opaque and (mismatch := uniform_mismatch(uniform, uniforms[name])) is not None:
             code, text = "RG436", f"{files} {mismatch}"
         else:
             continue
         yield _placed(step.problem(code, text), name, texts)
 
 
-def _mismatch(uniform: Uniform, value: Any) -> str | None:
+def uniform_mismatch(uniform: Uniform, value: Any) -> str | None:
     """What a uniform and the value that it is given disagree about: the driver would read beyond the numbers."""
     numbers = value if isinstance(value, tuple | list) else (value,)
     if len(numbers) % uniform.number_count or not 1 <= len(numbers) // uniform.number_count <= uniform.size:

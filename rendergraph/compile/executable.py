@@ -6,13 +6,14 @@ written by each draw. A changed parameter assembles the lists anew: no GL object
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Container, Iterable, Mapping
+from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct, field
 
 from rendergraph import activity
+from rendergraph.compile.checks import uniform_mismatch
 from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES
 from rendergraph.compile.memory import Call
 from rendergraph.compile.reuse import Reuse, Source
@@ -21,7 +22,7 @@ from rendergraph.gl.programs import Program
 from rendergraph.gl.state import Pieces, changes
 from rendergraph.program import prefix, used_blocks
 from rendergraph.schedule.dependencies import StepKey, touched_ids
-from rendergraph.steps import Read, Step
+from rendergraph.steps import Read, Step, UniformValue
 
 if TYPE_CHECKING:
     import moderngl
@@ -80,6 +81,20 @@ class SortedDraws(Struct, eq=False):
             self.render(part, first, count)
 
 
+class _Cell(Struct, eq=False):
+    """A uniform that `update` sets: what is written before a draw, where others have a call for good."""
+
+    step: StepKey
+    draw: Draw
+    name: str
+    value: Any = None
+    call: Call | None = None
+
+    def __call__(self) -> None:
+        if self.call is not None:
+            self.call()
+
+
 class CompiledStep(Struct, eq=False):
     """A step of one parity.
 
@@ -132,6 +147,8 @@ class Executable(Struct, eq=False, dict=True):
         contents: what `update` has written into buffers.
         stale: the buffers among them that this drawing has not written yet.
         touched: the sources that have changed since the last frame, except the scene's.
+        changes_seen: the scene's counters of changes, as of the last frame.
+        recorded_steps: those in the plan, and those that are left out.
         buffers: draw commands.
         uploads: values that the CPU gives textures and buffers, by the steps that upload them.
         vertex_arrays: frees the vertex arrays over the plan's own buffers.
@@ -163,9 +180,11 @@ class Executable(Struct, eq=False, dict=True):
     contents: dict[str, bytes] = field(default_factory=dict)
     stale: set[str] = field(default_factory=set)
     touched: set[Source] = field(default_factory=set)
+    recorded_steps: Sequence[Step] = ()
+    _cells: dict[tuple[str, str], list[_Cell]] = field(default_factory=dict)
     _steady: list[list[FrameStep]] = field(default_factory=list)
     _parts: dict[tuple[int, tuple[int, ...]], list[FrameStep]] = field(default_factory=dict)
-    _seen: Mapping[str, int] = field(default_factory=dict)
+    changes_seen: Mapping[str, int] = field(default_factory=dict)
     _running: bool = False
 
     def __post_init__(self) -> None:
@@ -177,6 +196,15 @@ class Executable(Struct, eq=False, dict=True):
         resources = self.plan.resources
         steps = self.plan.schedule.steps
         return {s.key: s for s in steps if any(resources[write.resource].role == "kept" for write in s.writes)}
+
+    @cached_property
+    def uniforms(self) -> Mapping[str, set[str]]:
+        """The names of the uniforms of each node, of steps that are left out as well."""
+        found: dict[str, set[str]] = {}
+        for step in self.recorded_steps:
+            for node, uniforms in ((step.node, step.uniforms), *((one.node, one.uniforms) for one in step.functions)):
+                found.setdefault(node, set()).update(name for name, _ in uniforms)
+        return found
 
     @property
     def programs(self) -> set[Program]:
@@ -211,7 +239,35 @@ class Executable(Struct, eq=False, dict=True):
         """A drawing begins: what `update` set in the one before does not hold."""
         for region in self.memory.regions.values():
             region.set()
+        for (node, _), cells in self._cells.items():
+            for cell in cells:
+                self._write(node, cell, cell.draw.uniforms[cell.name])
         self.stale = set(self.contents)
+
+    def set_uniform(self, node: str, name: str, value: UniformValue) -> str | None:
+        """Set a uniform of a node for `update`; return why its program cannot take the value."""
+        if (node, name) not in self._cells:
+            found = [
+                _Cell(compiled.step.key, draw, before + name)
+                for steps in self.steps
+                for compiled in steps
+                for before, kept in _uniforms_of(compiled.step, node)
+                for draw in (compiled.all_draws if name in kept and compiled.step.key not in self.kept else ())
+                if before + name in draw.program.uniforms
+            ]
+            self._cells[node, name] = found
+            if found:
+                self.assemble()
+        for cell in self._cells[node, name]:
+            if (mismatch := uniform_mismatch(cell.draw.program.uniforms[cell.name], value)) is not None:
+                return mismatch
+            self._write(node, cell, value)
+        return None
+
+    def _write(self, node: str, cell: _Cell, value: UniformValue) -> None:
+        if repr(cell.value) != repr(value):
+            cell.value, cell.call = value, cell.draw.program.writer(cell.name, value)
+            self.touched.add(("step", cell.step))
 
     def write_buffer(self, id: str, data: bytes) -> None:
         """Write a buffer for `update`; after what this drawing has written all is 0."""
@@ -257,10 +313,10 @@ class Executable(Struct, eq=False, dict=True):
     def steps_for_frame(self, parity: int, *, reuse: bool) -> list[FrameStep]:
         """What a frame runs: all steps, or with `reuse` those whose values are gone or out of date."""
         changes = self.scene.changes
-        if changes != self._seen:
-            changed = {name for name, count in changes.items() if self._seen.get(name, 0) != count}
+        if changes != self.changes_seen:
+            changed = {name for name, count in changes.items() if self.changes_seen.get(name, 0) != count}
             self.touched |= changed
-            self._seen = dict(changes)
+            self.changes_seen = dict(changes)
             if again := {key for key, sources in self._kept_sources.items() if not sources.isdisjoint(changed)}:
                 self.due = self._with_dependents(self.due | again)
                 self.assemble()
@@ -322,12 +378,17 @@ class Executable(Struct, eq=False, dict=True):
     def assemble(self) -> None:
         """Make the flat lists of calls from the steps' draws, leaving out what changes nothing."""
         shared = _differing(draw for step in self.steps[0] for draw in step.all_draws)
+        cells = {(id(cell.draw), cell.name): cell for found in self._cells.values() for cell in found}
+        shared |= {(cell.draw.program.glo, cell.name) for cell in cells.values()}
         self.statics = []
         written: set[tuple[int, str]] = set()
 
         def writes(draw: Draw) -> list[Call]:
             own: list[Call] = []
             for name, value in draw.uniforms.items():
+                if cells and (cell := cells.get((id(draw), name))) is not None:
+                    own.append(cell)
+                    continue
                 key = (draw.program.glo, name)
                 if key not in shared and key in written:
                     continue
@@ -439,6 +500,13 @@ def step_uniforms(step: Step) -> dict[str, Any]:
     if step.view_index is not None:
         values["view_index"] = step.view_index
     return values
+
+
+def _uniforms_of(step: Step, node: str) -> Iterator[tuple[str, Container[str]]]:
+    """What stands before the names of a node's uniforms in a step's program, and those names."""
+    if step.node == node:
+        yield "", dict(step.uniforms)
+    yield from ((prefix(node), dict(each.uniforms)) for each in step.functions if each.node == node)
 
 
 def _differing(draws: Iterable[Draw]) -> set[tuple[int, str]]:

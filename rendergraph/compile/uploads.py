@@ -15,12 +15,13 @@ from rendergraph.scene.facts import FrameScene
 from rendergraph.steps import Step, Upload
 from rendergraph.steps.checks import texels
 
-_CHANGES = {
+SCENE_CHANGES = {
     "transforms": "instances",
     "lights": "light_block",
     "materials": "material_block",
     "environment": "environment_block",
 }
+"""What of a scene can change, by the counters of `GpuScene.changes`."""
 
 
 class UploadedValues(Struct, eq=False):
@@ -40,7 +41,7 @@ class UploadedValues(Struct, eq=False):
     @property
     def _sources(self) -> object:
         upload = self.upload
-        return upload, [self.scene.changes[_CHANGES[source]] for source in upload.sources]
+        return upload, [self.scene.changes[SCENE_CHANGES[source]] for source in upload.sources]
 
     @property
     def upload(self) -> Upload:

@@ -126,6 +126,7 @@ class GpuCache:
             self._entries[key] = _Entry(executable, files)
         finally:
             self.programs.trim({program for kept in self.executables for program in kept.programs})
+        executable.recorded_steps = planned.expansion.steps
         executable.shares_kept = planned.options.shares
         self.kept.restore(executable)
         return executable

@@ -7,6 +7,7 @@ A node's `record` fills a `Steps` without GL, so what a pass does can be read, t
 from __future__ import annotations
 
 from rendergraph.steps.checks import define_text as define_text
+from rendergraph.steps.frame import Change as Change
 from rendergraph.steps.frame import Frame as Frame
 from rendergraph.steps.frame import FrameScene as FrameScene
 from rendergraph.steps.frame import ViewMatrices as ViewMatrices

@@ -5,13 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
 
 from rendergraph.ports import Port, Views
+from rendergraph.steps.model import SceneSource, UniformValue
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
+
+
+Change: TypeAlias = Literal["camera"] | SceneSource
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +136,23 @@ class Frame(Protocol):
                 height of 0 nothing is drawn.
             depth_bounds: minimum and maximum of the values in the depth texture where fragments pass, 0 to 1. A driver
                 without depth bounds ignores it: it saves work, and must not change the picture.
+        """
+        ...
+
+    def set_uniform(self, name: str, value: UniformValue) -> None:
+        """Set a uniform of the node's steps from now on.
+
+        It must have a value before: it is a parameter, or a keyword of a step (`steps.fullscreen(…, wind=(0, 0))`). A
+        step that makes kept values keeps that value.
+        """
+        ...
+
+    def changed(self, *what: Change) -> bool:
+        """Whether something has changed since the frame before; true in the first frame.
+
+        Args:
+            what: `camera` (where it is, its lens and the size, without jitter), `transforms`, `lights`, `materials`,
+                `environment`; all of them if nothing is given. After a change of a parameter frames begin anew.
         """
         ...
 
