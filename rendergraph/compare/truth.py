@@ -9,6 +9,7 @@ error that is measured is the sum of both.
 from __future__ import annotations
 
 import contextlib
+import io
 import itertools
 import math
 import os
@@ -230,8 +231,6 @@ def _load(key: str) -> Truth | None:
 
 def _save(key: str, truth: Truth) -> None:
     """Cache a truth; a disk that is full or cannot be written to costs only the time to draw it again."""
-    import io
-
     data = io.BytesIO()
     np.savez(
         data,
