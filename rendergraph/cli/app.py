@@ -31,6 +31,7 @@ from rendergraph.version import __version__
 
 _MODULES = {
     "authoring": ("init", "new-node", "check-node"),
+    "edit": ("edit", "upgrade"),
     "inspection": ("check", "plan", "graph", "config", "diff", "schema"),
     "lists": ("nodes", "pipelines", "scenes", "environments"),
 }
@@ -43,6 +44,8 @@ VERBS = (
     "graph",
     "config",
     "diff",
+    "edit",
+    "upgrade",
     "compare",
     "sweep",
     "farm",

@@ -71,8 +71,7 @@ def check(selection: Selection, as_json: bool, profile: str | None) -> None:
     width, height = graph.size
     links = sum(len(ends) for node in graph.nodes for ends in node.inputs.values())
     fits = "; within the limits of every OpenGL 4.5 device" if profile else ""
-    names = ", ".join(graph.outputs)
-    say(f"{graph.name}: {len(graph.nodes)} nodes, {links} links, {width}×{height}, outputs {names}{fits}")
+    say(graph.summary + fits)
     if as_json:
         report = {"pipeline": graph.name, "size": [width, height], "nodes": len(graph.nodes), "links": links}
         outputs = {name: str(end) for name, end in graph.outputs.items()}
@@ -252,7 +251,7 @@ def schema(
     output: Path | None,
     as_json: bool,
 ) -> None:
-    """Print the JSON Schema of a kind of file, or a shader in full, for editors.
+    """Print the JSON Schema of a kind of file, or a whole shader.
 
     The schema of pipelines contains all installed nodes, and what shipped pipelines consist of, for files that extend
     them. FILE is a pipeline: its schema also contains what it extends, its shader files, and for each input of its

@@ -215,7 +215,7 @@ def parse(
         raise InputError(source.problem("RG008", what, *source.at(illegal.start())))
     builder = _Builder(source, limits)
     try:
-        parser: Any = _parser(text)
+        parser: Any = parser_of(text)
         parser.get_event()  # the stream's start
         event = parser.get_event()
         if isinstance(event, yaml.StreamEndEvent):
@@ -236,7 +236,7 @@ def parse(
     return Document(root, source, tuple(builder.problems))
 
 
-def _parser(text: str) -> object:
+def parser_of(text: str) -> object:
     try:
         from yaml.cyaml import CParser  # type: ignore[attr-defined]  # the stubs leave it out
     except ImportError:  # PyYAML built without libyaml: the same events, ten times slower

@@ -236,7 +236,7 @@ class Includes:
         if match is None:
             text = f"'#include {written[:60]}' is not '#include <name.glsl>' or '#include \"name.glsl\"'"
             raise _error("RG405", text, origin, raw)
-        name = _old_names(self.include_folder).get(written, match[1] or match[2])
+        name = old_names(self.include_folder).get(written, match[1] or match[2])
         beside = match[1] is not None
         shared = not beside or in_shared
         places = [(file.parent, root)] if beside else [(self.include_folder, self.include_folder)]
@@ -262,8 +262,14 @@ class Includes:
         raise _error("RG401", f"there is no include '{name}' {where}{suggestion(name, known)}", origin, raw)
 
 
+def old_name_pattern(old: str) -> str:
+    """Return what finds an old name in a shader's text."""
+    pattern = re.escape(old).replace(r"\(\)", r"(?=\s*\()") + r"(?!\w)"
+    return pattern if old[0] == "." else r"(?<![\w.])" + pattern
+
+
 @cache
-def _old_names(include_folder: Path) -> dict[str, str]:
+def old_names(include_folder: Path) -> dict[str, str]:
     """Return old names of `<files>`, `functions()`, `.members` and other words of the shared includes, with the new."""
     file = include_folder / "old_names.json"
     return json.decode(file.read_bytes()) if file.is_file() else {}
@@ -276,10 +282,9 @@ def find_old_names(source: SourceText, include_folder: Path) -> tuple[dict[str, 
     shipped = f"{include_folder.parent}/"
     own = [file for file in source.files if not str(file).startswith(shipped)]
     shared = SourceText(tuple(block for block in source.blocks if own and block.origin.file not in own)).text
-    for file, (old, new) in product(own, _old_names(include_folder).items()):
+    for file, (old, new) in product(own, old_names(include_folder).items()):
         name, text = old.strip("<>.()"), strip_comments(read_text(file))
-        pattern = re.escape(old).replace(r"\(\)", r"(?=\s*\()") + r"(?!\w)"
-        match = re.search(pattern if old[0] == "." else r"(?<![\w.])" + pattern, text)
+        match = re.search(old_name_pattern(old), text)
         defined = rf"(?m)^\s*\w+\s+{new}\s*\([^;{{}}]*\)\s*\{{|\b(?:define|struct)\s+{new}\b"
         is_own = match and name in declared(text) and re.search(defined, shared)  # not what an include lets it define
         if match and not is_own and (old[0] == "<" or name.startswith("v_") or mentions(shared, new)):

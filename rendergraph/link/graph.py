@@ -92,6 +92,15 @@ class Graph(Struct, frozen=True, dict=True):
         width, height = self.size
         return f"<Graph {self.name}, {width}×{height}: {', '.join(self.members)} → {', '.join(self.outputs)}>"
 
+    @property
+    def summary(self) -> str:
+        """What `check` says about it."""
+        links = sum(len(ends) for node in self.nodes for ends in node.inputs.values())
+        width, height = self.size
+        return (
+            f"{self.name}: {len(self.nodes)} nodes, {links} links, {width}×{height}, outputs {', '.join(self.outputs)}"
+        )
+
     def __getitem__(self, node: str) -> GraphNode:
         return self.members[node]
 

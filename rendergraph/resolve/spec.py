@@ -30,7 +30,7 @@ def to_yaml(tree: Value, origins: bool) -> str:
 
 def _block(value: Value, indent: int) -> Iterator[tuple[str, Value | None]]:
     for key, child in value.items():
-        head = f"{'  ' * indent}{_text(key)}:"
+        head = f"{'  ' * indent}{text_of(key)}:"
         if isinstance(child.data, dict) and child.data:
             yield head, None
             yield from _block(child, indent + 1)
@@ -39,15 +39,17 @@ def _block(value: Value, indent: int) -> Iterator[tuple[str, Value | None]]:
 
 
 def flow(value: Value) -> str:
+    """Return a value as YAML in one line."""
     data = value.data
     if isinstance(data, dict):
-        return "{" + ", ".join(f"{_text(key)}: {flow(child)}" for key, child in data.items()) + "}"
+        return "{" + ", ".join(f"{text_of(key)}: {flow(child)}" for key, child in data.items()) + "}"
     if isinstance(data, list):
         return "[" + ", ".join(flow(child) for child in data) + "]"
-    return _text(data)
+    return text_of(data)
 
 
-def _text(data: Any) -> str:
+def text_of(data: Any) -> str:
+    """Return a scalar as YAML, in quotes where it needs them."""
     if data is None:
         return "null"
     if isinstance(data, bool):

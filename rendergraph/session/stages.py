@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from rendergraph.session.progress import Progress
 
 
-def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
+def resolve(selection: Selection, catalog: Catalog | None = None, document: Document | None = None) -> Resolved:
     """Read the file and everything it refers to, and apply the selection; of a picture, the pipeline in its metadata.
 
     Only a file that is missing, not YAML, or extends itself is an error here; `link` reports all other mistakes.
@@ -53,6 +53,7 @@ def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
     Args:
         selection: the pipeline, and the changes to it.
         catalog: the available node types; by default the installed ones and those of plugins.
+        document: the selected file where it is read already, such as one that has been edited and not been written.
     """
     for folder in selection.asset_roots:
         if not folder.is_dir():
@@ -60,7 +61,7 @@ def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
             raise InputError(Problem("RG011", text, Place(Option("--asset-root"))))
     catalog = catalog or Catalog.discover(selection.plugins)
     limits = YamlLimits(**selection.allowed("yaml"))
-    source: str | Document = selection.source
+    source: str | Document = document or selection.source
     frames, fps = range(1, 2), 30.0
     if is_picture(selection.source):
         picture = read_picture_metadata(Path(selection.source), limits)

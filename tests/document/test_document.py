@@ -29,7 +29,7 @@ def _parser(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
     if request.param == "python":
         from yaml import SafeLoader
 
-        monkeypatch.setattr(parsing, "_parser", SafeLoader)
+        monkeypatch.setattr(parsing, "parser_of", SafeLoader)
 
 
 @pytest.mark.usefixtures("_parser")

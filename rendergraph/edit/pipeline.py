@@ -1,0 +1,254 @@
+"""Changes to the text of a pipeline file, in the terms of its graph: nodes, links, parameters.
+
+A file that extends another holds only its differences. So what it inherits is changed by an entry of its own, and what
+it inherits is removed by a `null`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from msgspec import Struct
+
+from rendergraph.catalog import Catalog
+from rendergraph.document import Document, YamlLimits, from_plain, parse, shown
+from rendergraph.edit import text as yaml_text
+from rendergraph.edit.text import DELETED
+from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.read import NAME, PIPELINE, read
+from rendergraph.resolve import resolve
+from rendergraph.resolve.files import Files
+from rendergraph.resolve.patches import TypeNames
+
+_FILE_KEYS = {key.name for key in PIPELINE.keys} - {"nodes", "outputs", "inputs", "parameters"}
+
+
+class PipelineText(Struct, eq=False):
+    """A pipeline file that is being edited.
+
+    Attributes:
+        text: what has become of it; a method changes it, or raises an `InputError` that says what is wrong.
+        path: its file, to which what it names is relative.
+        notes: what the changes took along, one line each.
+    """
+
+    text: str
+    path: Path
+    catalog: Catalog
+    notes: list[str] = []
+
+    def add(self, id: str, node_type: str, values: Mapping[str, Any] = {}) -> None:
+        """Add a node; `values` are its links and parameters, by name."""
+        self._require_new(id)
+        names = self._names(node_type)
+        parts: dict[str, dict[str, Any]] = {"inputs": {}, "params": {}}
+        for name, value in values.items():
+            if name not in names.inputs | names.params:
+                hint = suggestion(name, sorted(names.inputs | names.params))
+                raise _mistake("RG103", f"node type '{node_type}' has no param or input '{shown(name)}'{hint}")
+            parts["inputs" if name in names.inputs else "params"][name] = value
+        self._set(("nodes", id), {"type": node_type, **{name: part for name, part in parts.items() if part}})
+
+    def delete(self, id: str) -> None:
+        """Remove a node and the links to it that this file has."""
+        self._node(id)
+        for path, link in self._links():
+            links = link if isinstance(link, list) else [link]
+            left = [one for one in links if _source(one) != id]
+            if len(left) < len(links):
+                self.notes.append(f"'{path[1]}{path[3:] and '.' + str(path[3])}' no longer reads '{id}'")
+                self._set(path, left if len(left) > 1 else left[0] if left else DELETED)
+        self._set(("nodes", id), DELETED)
+
+    def rename(self, id: str, new: str) -> None:
+        """Give a node another id, also in the links that this file has."""
+        self._node(id)
+        self._require_new(new)
+        if _at(self._inherited(), ("nodes", id)) is not None:
+            raise _mistake("RG109", f"node '{id}' comes from the file that this one extends; rename it there")
+        self.text = yaml_text.rename(self.text, ("nodes", id), new)
+        for path, link in self._links():
+            for number, one in enumerate(link if isinstance(link, list) else [link]):
+                if _source(one) == id:
+                    self._set((*path, number) if isinstance(link, list) else path, new + one[len(id) :])
+
+    def connect(self, end: str, links: Sequence[str]) -> None:
+        """Connect an input, `node.input`, or an output of the file, `outputs.name`."""
+        self._set(self._end(end), links[0] if len(links) == 1 else list(links))
+
+    def disconnect(self, end: str) -> None:
+        """Remove the link of an input, or an output of the file."""
+        path = self._end(end)
+        if _at(self._whole(), path) is None:
+            raise _mistake("RG114", f"'{end}' is not connected")
+        self._set(path, DELETED)
+
+    def set(self, name: str, value: Any) -> None:
+        """Set a parameter, `node.param` or the name of one of the pipeline, or a key of the file; None unsets it."""
+        id, _, param = name.rpartition(".")
+        path: yaml_text.Path
+        if id:
+            node = self._node(id)
+            names = self._names(node.get("type"))
+            if param not in names.params:
+                is_input = f"; it is an input: connect {name} LINK"
+                hint = is_input if param in names.inputs else suggestion(param, sorted(names.params))
+                raise _mistake("RG103", f"{_of_type(node)} has no param '{shown(param)}'{hint}")
+            path = ("nodes", id, "params", param)
+        else:
+            parameters = _at(self._whole(), ("parameters",)) or {}
+            if name not in parameters and name not in _FILE_KEYS:
+                hint = suggestion(name, parameters) or "; write NODE.PARAM for one of a node"
+                raise _mistake("RG119", f"the pipeline has no parameter '{shown(name)}'{hint}")
+            path = ("parameters", name, "default") if name in parameters else (name,)
+        self._set(path, DELETED if value is None else value)
+
+    def retype(self, id: str, node_type: str) -> None:
+        """Give a node another type; what this file gives it and the new type has not is dropped."""
+        self._node(id)
+        names = self._names(node_type)
+        for part, known in (("inputs", names.inputs), ("params", names.params)):
+            for name in set(_at(self._own(), ("nodes", id, part)) or ()) - known:
+                self.notes.append(f"'{node_type}' has no {part[:-1]} '{name}'; dropped")
+                self._set(("nodes", id, part, name), DELETED)
+        self._set(("nodes", id, "type"), node_type)
+
+    def disable(self, id: str) -> None:
+        """Take a node out; nodes that read it read its input instead."""
+        self._node(id)
+        self._set(("nodes", id, "enabled"), False)
+
+    def enable(self, id: str) -> None:
+        """Put a disabled node back."""
+        self._node(id)
+        inherited = _at(self._inherited(), ("nodes", id, "enabled")) is False
+        self._set(("nodes", id, "enabled"), True if inherited else DELETED)
+
+    def insert(self, id: str, node_type: str, end: str, port: str = "", out: str = "") -> None:
+        """Put a new node into the link of an input or of an output of the file, through its ports `port` and `out`."""
+        path = self._end(end)
+        link = _at(self._whole(), path)
+        if not isinstance(link, str):
+            raise _mistake("RG114", f"'{end}' has no single link that a node could be put into")
+        if not out:
+            port, out = self._passage(node_type)
+        self.add(id, node_type, {port: link if "." in link else f"{link}.{path[-1]}"})
+        self._set(path, f"{id}.{out}")
+
+    def duplicate(self, id: str, new: str) -> None:
+        """Add a node that has the type, links and parameters of another, inherited ones included."""
+        node = self._node(id)
+        self._require_new(new)
+        self._set(("nodes", new), node)
+
+    def upgrade(self) -> None:
+        """Rewrite what is spelt as in an earlier version: begin with the version of the format."""
+        if "rendergraph" in self._whole():
+            return
+        root = yaml_text.spans(self.text, ())[0]
+        put = "rendergraph: 1" + ((yaml_text.BREAK.search(self.text) or ["\n"])[0] if root.block else ", ")
+        at = root.start + (not root.block)
+        self.text = self.text[:at] + put + self.text[at:]
+
+    # --- what is there -----------------------------------------------------------------------------------------------
+
+    def _own(self) -> Any:
+        return parse(self.text).root.plain()
+
+    def _whole(self) -> Any:
+        return resolve(self._document(), catalog=self.catalog).tree.plain()
+
+    def _inherited(self) -> Any:
+        """The file that this one extends, with everything that it extends in turn."""
+        document = self._document()
+        kept = {key: value for key, value in document.root.items() if key in ("extends", "plugins")}
+        if "extends" not in kept:
+            return {}
+        base = Document(document.root.with_data(kept), document.source)
+        return resolve(base, catalog=self.catalog).tree.plain()
+
+    def _document(self) -> Document:
+        return read(self.path, self.text, keep_going=True)
+
+    def _node(self, id: str) -> dict[str, Any]:
+        nodes = _at(self._whole(), ("nodes",)) or {}
+        if id not in nodes:
+            raise _mistake("RG109", f"there is no node '{shown(id)}'{suggestion(id, nodes)}")
+        return nodes[id] or {}
+
+    def _require_new(self, id: str) -> None:
+        if not NAME.match(id) or id == "inputs":
+            expected = "expected letters, digits, '_' and '-', no digit first"
+            raise _mistake("RG107", f"a node cannot be called '{shown(id)}': {expected}")
+        if id in (_at(self._whole(), ("nodes",)) or {}):
+            raise _mistake("RG107", f"there is a node '{id}' already; choose another id")
+
+    def _names(self, node_type: Any) -> TypeNames:
+        document = self._document()
+        files = Files(self.catalog, (), YamlLimits())
+        files.own(document)
+        names = files.names_of(from_plain(node_type, document.source))
+        if names is None:
+            hint = suggestion(str(node_type), self.catalog.names())
+            raise _mistake("RG102", f"there is no node type '{shown(node_type)}'{hint}")
+        return names
+
+    def _end(self, end: str) -> yaml_text.Path:
+        """Return the path of what `node.input` or `outputs.name` names."""
+        id, _, port = end.rpartition(".")
+        if id == "outputs":
+            return ("outputs", port)
+        node = self._node(id or end)
+        names = self._names(node.get("type"))
+        if port not in names.inputs:
+            raise _mistake("RG111", f"{_of_type(node)} has no input '{shown(port)}'{suggestion(port, names.inputs)}")
+        return ("nodes", id, "inputs", port)
+
+    def _links(self) -> Iterator[tuple[yaml_text.Path, Any]]:
+        """Yield the links that this file has itself, with their places."""
+        own = self._own()
+        for id, node in (own.get("nodes") or {}).items():
+            for name, link in (_at(node, ("inputs",)) or {}).items():
+                yield ("nodes", id, "inputs", name), link
+        yield from ((("outputs", name), link) for name, link in (own.get("outputs") or {}).items())
+
+    def _passage(self, node_type: str) -> tuple[str, str]:
+        """Return an input and the output that continues it, required inputs first."""
+        cls = self.catalog.get(node_type).cls if node_type in self.catalog else None
+        for name, port in sorted(cls.inputs().items(), key=lambda item: item[1].optional) if cls else ():
+            for out, made in cls.outputs().items() if cls else ():
+                means = getattr(made, "semantic", None)
+                if name in (out, getattr(made, "like", None)) or (means is not None and means == port.semantic):
+                    return name, out
+        raise _mistake("RG112", f"'{node_type}' has no output that continues an input; name both: INPUT OUTPUT")
+
+    def _set(self, path: yaml_text.Path, value: Any) -> None:
+        """Set or delete an entry, inherited ones by null; `inputs` and `params` that become empty go, too."""
+        if value is DELETED:
+            if _at(self._inherited(), path) is not None:
+                value = None
+            elif _at(own := self._own(), path[:-1]) is None or path[-1] not in _at(own, path[:-1]):
+                return
+            elif len(path) == 4 and len(_at(own, path[:-1])) == 1:
+                path = path[:-1]
+        self.text = yaml_text.edit(self.text, path, value)
+
+
+def _mistake(code: str, text: str) -> InputError:
+    return InputError(Problem(code, text))
+
+
+def _at(data: Any, path: Iterable[Any]) -> Any:
+    for step in path:
+        data = data.get(step) if isinstance(data, dict) else None
+    return data
+
+
+def _source(link: Any) -> str:
+    return str(link).partition("@")[0].partition(".")[0]
+
+
+def _of_type(node: Mapping[str, Any]) -> str:
+    return f"node type '{node['type']}'" if isinstance(node.get("type"), str) else "the sub-pipeline"

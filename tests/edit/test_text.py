@@ -1,0 +1,252 @@
+"""YAML text changed in place: the values are those of the change, and every other byte is as before."""
+
+from __future__ import annotations
+
+import copy
+import json
+import re
+from collections import Counter
+from typing import Any
+
+import yaml
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from rendergraph.document import parse
+from rendergraph.edit.text import DELETED, edit, rename
+from rendergraph.errors import InputError
+
+# --- texts of every style ---------------------------------------------------------------------------------------------
+
+WORDS = st.sampled_from(["a", "light", "no", "x-1", "größe", "日本", "😀 b", "a b", "0x", "null ", "#1", "- q", "k: v"])
+SCALARS = st.one_of(st.none(), st.booleans(), st.integers(-99, 99), st.floats(-9, 9, width=16), WORDS)
+KEYS = st.sampled_from(["a", "b", "light", "no", "größe", "日本", "k-1", "a.b", "😀"])
+VALUES = st.recursive(
+    SCALARS,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=3),
+    max_leaves=6,
+)
+TREES = st.dictionaries(KEYS, VALUES, min_size=1, max_size=4)
+
+
+class Writer:
+    """Writes a value as YAML with styles, spaces, comments and line breaks that are drawn."""
+
+    def __init__(self, draw: Any) -> None:
+        self._draw = draw
+        self.newline = draw(st.sampled_from(["\n", "\r\n"]))
+
+    def pick(self, *choices: Any) -> Any:
+        return self._draw(st.sampled_from(choices))
+
+    def scalar(self, value: Any, *, key: bool = False, flow: bool = False) -> str:
+        if isinstance(value, str):
+            plain = re.fullmatch(r"[^\W\d][\w.-]*", value) is not None and value not in ("null", "true", "false")
+            quoted = ["'" + value.replace("'", "''") + "'", '"' + value.replace('"', '\\"') + '"']
+            return str(self.pick(*quoted, *([value] * 3 if plain else [])))
+        if value is None:
+            return str(self.pick("null", "~", *([] if key or flow else [""])))
+        return {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
+
+    def comment(self) -> str:
+        return str(self.pick("", "", "", "  # ein Rest: {x}, [y]", " # c"))
+
+    def own_line(self, indent: int) -> str:
+        return str(self.pick("", "", "", " " * indent + "# above, {a: 1}" + self.newline, self.newline))
+
+    def flow(self, value: Any) -> str:
+        gap = self.pick("", "", " ", self.newline + "        ", f" # in, [side]{self.newline}        ")
+        if isinstance(value, dict):
+            inner = f",{gap or ' '}".join(f"{self.scalar(k, key=True)}: {self.flow(v)}" for k, v in value.items())
+            end = self.pick("", " ", ",") if value else self.pick("", " ")
+            return f"{{{gap}{inner}{end}}}"
+        if isinstance(value, list):
+            return "[" + f",{gap or ' '}".join(map(self.flow, value)) + "]"
+        return str(self.scalar(value, flow=True))
+
+    def block(self, tree: dict[str, Any], indent: int) -> str:
+        text = ""
+        for key, value in tree.items():
+            text += self.own_line(indent) + " " * indent + self.scalar(key, key=True) + ":"
+            if isinstance(value, dict) and value and self.pick(True, True, False):
+                text += self.comment() + self.newline + self.block(value, indent + self.pick(1, 2, 4))
+            elif isinstance(value, str) and value.isalnum() and self.pick(True, False, False):
+                more = self.newline if self.pick(True, False) else ""
+                text += " |-" + self.newline + " " * (indent + 3) + value + self.newline + more
+            else:
+                written = self.scalar(value) if not isinstance(value, dict | list) else self.flow(value)
+                text += (self.pick(" ", "   ") + written if written else "") + self.comment() + self.newline
+        return text
+
+
+@st.composite
+def documents(draw: Any) -> tuple[str, dict[str, Any]]:
+    tree = draw(TREES)
+    writer = Writer(draw)
+    head = writer.pick("", "", f"# yaml-language-server: $schema=x{writer.newline}", f"---{writer.newline}")
+    text = head + (writer.block(tree, 0) if writer.pick(True, True, False) else writer.flow(tree) + writer.newline)
+    if writer.pick(True, False):
+        text = text.rstrip("\r\n")
+    assume(plain(text) == tree)
+    return text, tree
+
+
+def plain(text: str) -> Any:
+    try:
+        return parse(text).root.plain()
+    except InputError:
+        return None
+
+
+def paths(tree: Any, before: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Every entry of every mapping below mappings."""
+    if not isinstance(tree, dict):
+        return []
+    return [path for key, child in tree.items() for path in [(*before, key), *paths(child, (*before, key))]]
+
+
+def span(text: str, path: tuple[Any, ...]) -> tuple[int, int]:
+    """Where an entry stands, from its key to the end of its value: from PyYAML's other parser."""
+    node: Any = yaml.compose(text, yaml.SafeLoader)
+    key = node
+    for step in path:
+        key, node = next((k, v) for k, v in node.value if k.value == str(step))
+    last = node
+    while isinstance(last, yaml.CollectionNode) and not last.flow_style:
+        last = last.value[-1][1] if isinstance(last, yaml.MappingNode) else last.value[-1]
+    end = last.end_mark.index
+    if getattr(last, "style", None) == "|":
+        end = len(text[:end].rstrip())
+    return key.start_mark.index, max(end, key.end_mark.index)
+
+
+def lost(before: str, after: str) -> tuple[str, str, int]:
+    """What is removed, what is put there, and where: between the longest common beginning and end."""
+    start = next(
+        (i for i, (x, y) in enumerate(zip(before, after, strict=False)) if x != y), min(len(before), len(after))
+    )
+    most = min(len(before), len(after)) - start
+    end = next((i for i in range(most) if before[-1 - i] != after[-1 - i]), most)
+    return before[start : len(before) - end], after[start : len(after) - end], start
+
+
+def lines(text: str) -> list[str]:
+    return re.findall(r"[^\r\n]*(?:\r\n|\n|\Z)", text)
+
+
+@settings(max_examples=40, deadline=None)
+@given(documents(), st.data())
+def test_a_value_is_replaced_and_nothing_else(document: tuple[str, dict[str, Any]], data: st.DataObject) -> None:
+    text, tree = document
+    path, value = data.draw(st.sampled_from(paths(tree))), data.draw(VALUES)
+    after = edit(text, path, value)
+    expected = copy.deepcopy(tree)
+    holder = expected
+    for step in path[:-1]:
+        holder = holder[step]
+    holder[path[-1]] = value
+    assert repr(plain(after)) == repr(expected)
+    first, last = span(text, path)
+    if "\n" in text[first:last]:  # a value in lines takes the comment of its last line
+        last += len(text[last:].partition("\n")[0])
+    removed, _, at = lost(text, after)
+    assert after == text or (first <= at and at + len(removed) <= last + 2)
+    assert comments(after) >= comments(text[:first]) + comments(text[last:])
+
+
+def comments(text: str) -> Counter[str]:
+    return Counter(re.findall(r"(?:(?<=\s)|^)#[^\r\n]*", text))
+
+
+@settings(max_examples=40, deadline=None)
+@given(documents(), st.data())
+def test_an_entry_is_added_and_nothing_is_lost(document: tuple[str, dict[str, Any]], data: st.DataObject) -> None:
+    text, tree = document
+    holders = [(), *(path for path in paths(tree) if isinstance(plain_at(tree, path), dict))]
+    path, value = data.draw(st.sampled_from(holders)), data.draw(VALUES)
+    more = data.draw(st.sampled_from([("new",), ("new", "inner")]))
+    after = edit(text, (*path, *more), value)
+    expected = copy.deepcopy(tree)
+    plain_at(expected, path)["new"] = value if len(more) == 1 else {"inner": value}
+    assert repr(plain(after)) == repr(expected)
+    removed, _, _ = lost(text, after)
+    assert removed == ""
+
+
+def plain_at(tree: Any, path: tuple[Any, ...]) -> Any:
+    for step in path:
+        tree = tree[step]
+    return tree
+
+
+@settings(max_examples=40, deadline=None)
+@given(documents(), st.data())
+def test_an_entry_is_deleted_with_its_line_or_comma(document: tuple[str, dict[str, Any]], data: st.DataObject) -> None:
+    text, tree = document
+    path = data.draw(st.sampled_from(paths(tree)))
+    after = edit(text, path, DELETED)
+    expected = copy.deepcopy(tree)
+    del plain_at(expected, path[:-1])[path[-1]]
+    assert repr(plain(after)) == repr(expected)
+    only = len(plain_at(tree, path[:-1])) == 1 and len(path) > 1
+    first, last = span(text, path[:-1] if only else path)
+    put = text[first : span(text, path)[0]] if only else ""
+    put += "" if not only else "}" if letters(put).endswith("{") else "{}"
+    with_line = last + len(text[last:].partition("\n")[0])
+    if len(tree) > 1 or only:
+        assert letters(after) in (
+            letters(text[:first] + put + text[last:]),
+            letters(text[:first] + put + text[with_line:]),
+        )
+    assert comments(after) >= comments(text[:first]) + comments(text[with_line:])
+
+
+def letters(text: str) -> str:
+    """Without spaces, commas and comments."""
+    return re.sub(r"[\s,]", "", re.sub(r"(?:(?<=\s)|^)#[^\r\n]*", "", text))
+
+
+@settings(max_examples=40, deadline=None)
+@given(documents(), st.data())
+def test_a_key_is_renamed_and_nothing_else(document: tuple[str, dict[str, Any]], data: st.DataObject) -> None:
+    text, tree = document
+    path = data.draw(st.sampled_from(paths(tree)))
+    after = rename(text, path, "new_name")
+    first, _ = span(text, path)
+    removed, _, at = lost(text, after)
+    assert first <= at + len(removed) <= len(text)
+    assert text[:first] == after[:first]
+    node: Any = yaml.compose(text, yaml.SafeLoader)
+    for step in path[:-1]:
+        node = next(v for k, v in node.value if k.value == str(step))
+    key = next(k for k, _ in node.value if k.value == str(path[-1]))
+    assert after == text[: key.start_mark.index] + "new_name" + text[key.end_mark.index :]
+    assert list(plain_at(plain(after), path[:-1])) == [
+        "new_name" if name == path[-1] else name for name in plain_at(tree, path[:-1])
+    ]
+
+
+@settings(max_examples=40, deadline=None)
+@given(documents(), VALUES, st.data())
+def test_what_an_anchor_shares_changes_alone_or_not_at_all(
+    document: tuple[str, dict[str, Any]], shared: Any, data: st.DataObject
+) -> None:
+    text, tree = document
+    assume(isinstance(shared, dict | list) and not text.startswith(("{", "---", "#")))
+    newline = "\r\n" if "\r\n" in text else "\n"
+    text = f"first: &x {Writer(data.draw).flow(shared)}{newline}{text.rstrip()}{newline}last: {{in: *x}}{newline}"
+    tree = {"first": shared, **tree, "last": {"in": shared}}
+    assume(plain(text) == tree)
+    path = data.draw(st.sampled_from(paths(tree)))
+    value = data.draw(st.one_of(VALUES, st.just(DELETED)))
+    expected = copy.deepcopy(json.loads(json.dumps(tree)))
+    if value is DELETED:
+        del plain_at(expected, path[:-1])[path[-1]]
+    else:
+        plain_at(expected, path[:-1])[path[-1]] = value
+    try:
+        after = plain(edit(text, path, value))
+    except InputError:
+        assert path[0] == "first"  # nothing else is refused
+    else:
+        assert repr(after) == repr(expected)
