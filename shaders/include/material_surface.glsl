@@ -23,8 +23,8 @@ MaterialTexels no_texels() {
 }
 
 // Tangent along the rows of the normal map and bitangent up its columns, of one length at most 1, from the differences
-// of position and texture coordinates along two directions of the surface, a and b, which turn counter-clockwise for
-// the viewer (Schueler 2013). Any two directions of a triangle give the same frame.
+// of position and texture coordinates along two directions of the surface, a and b (Schueler 2013). Any two directions
+// of a triangle give the same frame, from whichever side it is seen.
 void uv_tangent_frame(
     vec3 normal, vec3 position_a, vec3 position_b, vec2 uv_a, vec2 uv_b, out vec3 tangent, out vec3 bitangent) {
     vec3 perpendicular_a = cross(position_b, normal), perpendicular_b = cross(normal, position_a);
@@ -36,8 +36,10 @@ void uv_tangent_frame(
         tangent = any_tangent(normal);
         bitangent = cross(normal, tangent);
     } else {
-        tangent *= inversesqrt(longest);
-        bitangent *= inversesqrt(longest);
+        float scale = inversesqrt(longest);
+        if (dot(normal, cross(position_a, position_b)) < 0.0) scale = -scale;
+        tangent *= scale;
+        bitangent *= scale;
     }
 }
 
