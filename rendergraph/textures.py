@@ -125,6 +125,11 @@ LinearDepth = Semantic("linear_depth", "Distance along the view axis, -z in view
 ShadowMap = Semantic("shadow_map", "Window depth seen from lights, one layer a view.")
 Visibility = Semantic("visibility", "1 lit, 0 shadowed, one layer a shadowed light.")
 Occlusion = Semantic("occlusion", "Ambient visibility: 1 open, 0 closed.")
+Reflections = Semantic(
+    "reflections", "Radiance reflected to the viewer, scene-linear; alpha is confidence, 0 to 1.", encoding="linear"
+)
+Irradiance = Semantic("irradiance", "Irradiance of surfaces, scene-linear.", encoding="linear")
+Reflectance = Semantic("reflectance", "Fraction of light that is reflected, linear, 0 to 1.", encoding="linear")
 Luminance = Semantic("luminance", "Scene luminance, relative to white at 1.")
 ExposureGain = Semantic("exposure_gain", "Factor that brings scene radiance to the display's range; one texel.")
 IrradianceSH = Semantic("irradiance_sh", "L2 spherical harmonics of the environment's radiance.")
@@ -146,10 +151,12 @@ class Signature(Struct, frozen=True):
     Attributes:
         declaration: the GLSL declaration without a semicolon.
         arguments: the argument names in order, to forward them.
-        combine: the operator that joins several providers.
-        neutral: the GLSL value with no provider.
+        combine: the operator that joins several providers. With "" there is at most one, and without it no function:
+            shaders ask `HAS_<PORT>` before they call.
+        neutral: the GLSL value with no provider; with `combine=""` what shaders assume then.
         doc: what it returns.
         texture: the semantic whose textures provide the same in screen space, one layer a light; None if there is none.
+        also: further functions that the same file defines; only with `combine=""`.
     """
 
     name: str
@@ -159,6 +166,12 @@ class Signature(Struct, frozen=True):
     neutral: str
     doc: str
     texture: str | None = None
+    also: tuple[Signature, ...] = ()
+
+    @property
+    def functions(self) -> tuple[Signature, ...]:
+        """It and the further functions."""
+        return self, *self.also
 
 
 ShadowLookup = Signature(
@@ -181,7 +194,36 @@ EnvironmentLight = Signature(
     "roughness, seen along the normal; 2 the cosine lobe of a diffuse surface; below 0 a cone of so many radians.",
 )
 
-SIGNATURES: tuple[Signature, ...] = (ShadowLookup, EnvironmentLight)
+Air = Signature(
+    name="air_at",
+    declaration="vec4 air_at(vec3 position)",
+    arguments=("position",),
+    combine="",
+    neutral="vec4(0.0, 0.0, 0.0, 1.0)",
+    doc="What lies between the camera and a world-space position: rgb in-scattered radiance, alpha transmittance.",
+)
+
+LightList = Signature(
+    name="light_count",
+    declaration="int light_count(vec3 position)",
+    arguments=("position",),
+    combine="",
+    neutral="LIGHT_COUNT",
+    doc="Number of lights that may reach a world-space position; called before `light_at`, so it may keep in a global "
+    "variable where their list begins.",
+    also=(
+        Signature(
+            name="light_at",
+            declaration="int light_at(int index)",
+            arguments=("index",),
+            combine="",
+            neutral="index",
+            doc="Scene's index of a light of that list, counted from 0; indices ascend.",
+        ),
+    ),
+)
+
+SIGNATURES: tuple[Signature, ...] = (ShadowLookup, EnvironmentLight, Air, LightList)
 
 
 class Sampler(Struct, frozen=True):

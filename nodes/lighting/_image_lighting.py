@@ -8,7 +8,7 @@ from typing import Any
 from rendergraph.api import Depth, Facts, Input, Port, Steps, param
 
 from ..geometry._surface_textures import SURFACE_TEXTURES
-from ._lighting import Color, SurfaceLighting, shows_environment
+from ._lighting import Color, SurfaceLighting, draws_backdrop
 
 
 def gbuffer_samples(_node: Any, facts: Facts) -> int:
@@ -59,15 +59,19 @@ class ImageLighting(SurfaceLighting):
         """Return what `shadow()` reads."""
         return _connected(steps, [self.lookup, self.visibility] if self.wants_lights(steps) else [])
 
+    def direct_reads(self, steps: Steps) -> dict[str, Any]:
+        """Return what direct lighting by several lights reads: shadows and lists of lights."""
+        return self.shadow_reads(steps) | self.light_list_reads(steps)
+
     def ambient_reads(self, steps: Steps) -> dict[str, Any]:
-        """Return what ambient lighting reads: the environment and the occlusion."""
-        return self.environment_reads(steps) | _connected(
+        """Return what ambient lighting reads: the environment, reflections that replace it, and the occlusion."""
+        return super().ambient_reads(steps) | _connected(
             steps, [self.occlusion] if self.terms in ("all", "ambient") else []
         )
 
     def backdrop_defines(self, steps: Steps) -> dict[str, int]:
         """Return the macro of a step that leaves the background to a backdrop."""
-        return {"BACKDROP": 1} if shows_environment(self, steps.facts) else {}
+        return {"BACKDROP": 1} if draws_backdrop(self, steps.facts) else {}
 
     def draw_backdrop_and_transparent(self, steps: Steps) -> None:
         """Draw the environment behind the lit surfaces, then transparent surfaces over both, with the depth's view."""

@@ -7,18 +7,24 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rendergraph.api import (
     PREMULTIPLIED,
+    Air,
     Blend,
     Depth,
     EnvironmentLight,
     Facts,
     Input,
     Internal,
+    Irradiance,
+    LightList,
     Node,
     Occlusion,
     Output,
     Part,
     Port,
     Radiance,
+    Reflectance,
+    Reflections,
+    Semantic,
     ShadowLookup,
     State,
     Steps,
@@ -47,7 +53,7 @@ _OLD_METHODS = {
     "shadows_on_blended": "transparent_shadows",
     "surface": "gbuffer_reads",
 }
-DIFFUSE = "The same radiance without the specular part, which lights other surfaces."
+DIFFUSE = "The same radiance without the specular part and without air, which lights other surfaces."
 
 
 class Lighting(Node):
@@ -58,6 +64,18 @@ class Lighting(Node):
     )
     environment = Input(
         EnvironmentLight, kind="function", optional=True, doc="Light of the environment, which replaces `ambient`."
+    )
+    air = Input(
+        Air,
+        kind="function",
+        optional=True,
+        doc="Air between the viewer and everything that the node draws, the background included: fog, for instance.",
+    )
+    light_list = Input(
+        LightList,
+        kind="function",
+        optional=True,
+        doc="Lists of the lights that may reach a position; unconnected, every surface is lit by all lights.",
     )
     brdf_table = Internal(
         format="rg16",
@@ -113,7 +131,7 @@ class Lighting(Node):
 
     def record(self, steps: Steps) -> None:
         """Record the BRDF table, if surfaces reflect an environment."""
-        if "brdf_table" in self.environment_reads(steps):
+        if "brdf_table" in self.ambient_reads(steps):
             steps.fullscreen("brdf_table.frag", out=self.brdf_table, defines={"TABLE_SAMPLES": 512}, label="table")
 
     def environment_reads(self, steps: Steps) -> dict[str, Any]:
@@ -125,9 +143,25 @@ class Lighting(Node):
         table = {} if "phong" in needs else {"brdf_table": self.brdf_table.sampled("linear")}
         return {"environment": self.environment, **table}
 
+    def ambient_reads(self, steps: Steps) -> dict[str, Any]:
+        """Return what a shader reads for ambient lighting: the environment."""
+        return self.environment_reads(steps)
+
+    def air_reads(self, steps: Steps) -> dict[str, Any]:
+        """Return what a shader reads for the air in front of what it draws."""
+        return {"air": self.air} if steps.connected(self.air) else {}
+
+    def light_list_reads(self, steps: Steps) -> dict[str, Any]:
+        """Return what a shader reads to light a surface by some of the lights."""
+        return {"light_list": self.light_list} if self.wants_lights(steps) and steps.connected(self.light_list) else {}
+
     def lighting_reads(self, steps: Steps, shadows: Port) -> dict[str, Any]:
-        """Return what a shader reads that lights geometry while drawing it: the environment and shadow functions."""
-        return self.environment_reads(steps) | ({"lookup": shadows} if self.wants_lights(steps) else {})
+        """Return what a shader reads that lights geometry while drawing it.
+
+        This is the environment, the air, shadow functions and lists of lights.
+        """
+        reads = self.environment_reads(steps) | self.air_reads(steps)
+        return reads | ({"lookup": shadows, **self.light_list_reads(steps)} if self.wants_lights(steps) else {})
 
     def draw_transparent(
         self,
@@ -168,23 +202,73 @@ class Lighting(Node):
         )
 
 
+PARTS = ("direct_diffuse", "direct_specular", "environment_reflection", "specular_albedo", "irradiance")
+
+
+def _of_radiance(node: Node, facts: Facts, field: str, default: Any) -> Any:
+    """Return what the node's `radiance` declares, such as its format; a default where it declares nothing."""
+    declared = getattr(node.outputs().get("radiance"), field, None)
+    value = declared(node, facts) if callable(declared) else declared
+    return default if value is None else value
+
+
+def part_format(node: Node, facts: Facts) -> str:
+    """Return the format of the parts of the light: that of `radiance`."""
+    return str(_of_radiance(node, facts, "format", "rgba16f"))
+
+
+def part_samples(node: Node, facts: Facts) -> int:
+    """Return the sample count of the parts of the light: that of `radiance`."""
+    return int(_of_radiance(node, facts, "samples", 1))
+
+
+def _part(doc: str, semantic: Semantic = Radiance) -> Output:
+    return Output(semantic, format=part_format, samples=part_samples, clear=0.0, doc=doc)
+
+
 class SurfaceLighting(Lighting):
     """Base of the nodes that light a whole picture: opaque surfaces first, then transparent ones.
 
-    Screen-space visibility and occlusion are known only for the opaque surface of each pixel, so they do not apply to
-    transparent surfaces in front of it.
+    Screen-space visibility, occlusion and reflections are known only for the opaque surface of each pixel, so they do
+    not apply to transparent surfaces in front of it.
+
+    The light is also available in parts, which cost nothing unless they are used. On opaque surfaces, seen through no
+    `air`, the picture is `radiance` = `diffuse` + `direct_specular` + `environment_reflection` × `specular_albedo`. Of
+    `diffuse`, the part that is not emission is the diffuse reflectance × `irradiance` / π, and `direct_diffuse` is the
+    part of the lights alone. Transparent surfaces are blended over the radiances; they dim `specular_albedo` and leave
+    `environment_reflection` and `irradiance` as they are.
     """
 
     visibility = Input(
         Visibility, kind="texture2d_array", many=True, optional=True, doc="Screen-space shadows, one layer per light."
     )
     occlusion = Input(Occlusion, optional=True, doc="Scales the ambient light: 1 is open, 0 fully occluded.")
+    reflections = Input(
+        Reflections,
+        optional=True,
+        doc="Reflected radiance, which replaces the environment's in the specular lobe by its confidence (alpha). It "
+        "is not occluded.",
+    )
     blended_lookup = Input(
         ShadowLookup,
         kind="function",
         many=True,
         optional=True,
         doc="Shadow functions for transparent surfaces, if opaque ones use `visibility`.",
+    )
+
+    direct_diffuse = _part("Radiance of diffusely reflected light of the lights.")
+    direct_specular = _part("Radiance of specularly reflected light of the lights.")
+    environment_reflection = _part(
+        "Occluded radiance of the environment in the opaque surface's specular lobe, or `reflections` in its place."
+    )
+    specular_albedo = _part(
+        "Fraction of it that the opaque surface reflects to the viewer: the factor f0 A + f90 B of the split sum.",
+        Reflectance,
+    )
+    irradiance = _part(
+        "Irradiance of the opaque surface before albedo, from lights and environment, with shadows and occlusion.",
+        Irradiance,
     )
 
     backdrop: bool = structural(
@@ -201,30 +285,47 @@ class SurfaceLighting(Lighting):
     )
 
     def color_targets(self, steps: Steps) -> dict[str, Port]:
-        """Return `radiance`, and `diffuse` if it is used."""
+        """Return `radiance`, and its parts that are used."""
         ports = self.outputs()
-        wanted = ("radiance", "diffuse") if steps.used(ports["diffuse"]) else ("radiance",)
-        return {name: ports[name] for name in wanted}
+        used = [name for name in ("diffuse", *PARTS) if steps.used(ports.get(name))]
+        return {name: ports[name] for name in ("radiance", *used)}
+
+    def ambient_reads(self, steps: Steps) -> dict[str, Any]:
+        """Return what a shader reads for ambient lighting: the environment and the reflections that replace it."""
+        reads = self.environment_reads(steps)
+        if "phong" in steps.needs("shading") or "nothing" in steps.needs("shading"):
+            return reads  # these models have no specular light of the environment
+        shown = self.terms in ("all", "ambient") and self.environment_part in ("all", "specular")
+        reflections = {"reflections": self.reflections} if shown and steps.connected(self.reflections) else {}
+        if reflections or steps.used(self.specular_albedo):
+            reads |= {"brdf_table": self.brdf_table.sampled("linear"), **reflections}
+        return reads
 
     def draw_backdrop(self, steps: Steps, view: Port | None = None) -> None:
-        """Show the environment where no surface covers the picture.
+        """Show the environment, or the background behind air, where no surface covers the picture.
 
         Args:
             steps: records the step.
             view: a port that carries the view; by default the node's `view` input or the camera.
         """
+        if not draws_backdrop(self, steps.facts):
+            return
+        seen: dict[str, Any] = {"background": background_color(self)} if isinstance(self, GeometryLighting) else {}
         if shows_environment(self, steps.facts):
-            steps.draw(
-                "backdrop.frag",
-                vertex="<fullscreen.vert>",
-                vertices=3,
-                out=self.color_targets(steps),
-                view=view,
-                state=State(blend=UNDER, cull="none"),
-                environment=self.environment,
-                defines={"BLURRED": 1} if self.backdrop_blur > 0 else {},
-                label="backdrop",
-            )
+            seen = {"environment": self.environment}
+        targets = self.color_targets(steps)
+        steps.draw(
+            "backdrop.frag",
+            vertex="<fullscreen.vert>",
+            vertices=3,
+            out={name: targets[name] for name in ("radiance", "diffuse") if name in targets},
+            view=view,
+            state=State(blend=UNDER, cull="none"),
+            defines={"BLURRED": 1} if self.backdrop_blur > 0 else {},
+            label="backdrop",
+            **seen,
+            **self.air_reads(steps),
+        )
 
     def transparent_shadows(self, steps: Steps) -> Port:
         """Return the input with the shadow functions for transparent surfaces."""
@@ -238,12 +339,19 @@ def shows_environment(node: SurfaceLighting, facts: Facts) -> bool:
     return not plain and node.backdrop and facts.connected("environment") and node.terms in ("all", "ambient")
 
 
+def draws_backdrop(node: SurfaceLighting, facts: Facts) -> bool:
+    """Return whether a step of its own draws the background: the environment, or anything that is seen through air."""
+    return shows_environment(node, facts) or facts.connected("air")
+
+
+def background_color(node: GeometryLighting) -> tuple[float, float, float]:
+    """Return the background as RGB."""
+    return node.background if isinstance(node.background, tuple) else (node.background,) * 3
+
+
 def background_texel(node: GeometryLighting, facts: Facts) -> tuple[float, ...]:
     """Return the clear value of radiance: the node's background with a coverage of 0."""
-    if shows_environment(node, facts):
-        return 0.0, 0.0, 0.0, 0.0
-    rgb = node.background if isinstance(node.background, tuple) else (node.background,) * 3
-    return *rgb, 0.0
+    return (0.0,) * 4 if draws_backdrop(node, facts) else (*background_color(node), 0.0)
 
 
 def rendered_samples(node: GeometryLighting, facts: Facts) -> int:
@@ -297,7 +405,9 @@ class GeometryLighting(SurfaceLighting):
             options: further arguments of `steps.geometry`, such as reads beside depth, shadows and occlusion.
         """
         connected = [port for port in (self.depth, self.visibility, self.occlusion) if steps.connected(port)]
-        reads: dict[str, Any] = {port.name: port for port in connected}
+        reads: dict[str, Any] = {port.name: port for port in connected} | self.air_reads(steps)
+        if options.get("per_light") is None:
+            reads |= self.light_list_reads(steps)
         # `lookup` in any case: a step without reads would read all inputs.
         steps.geometry(fragment, out=self.targets(steps), objects="opaque", lookup=self.lookup, **reads, **options)
 

@@ -27,7 +27,7 @@ class DeferredLighting(ImageLighting):
     def record(self, steps: Steps) -> None:
         """Record the lighting step, then the backdrop and transparent surfaces."""
         super().record(steps)
-        reads = {**self.gbuffer_reads(steps), **self.shadow_reads(steps), **self.ambient_reads(steps)}
+        reads = self.gbuffer_reads(steps) | self.direct_reads(steps) | self.ambient_reads(steps) | self.air_reads(steps)
         defines = {**self.per_sample(steps), **self.backdrop_defines(steps)}
         steps.fullscreen("deferred_lighting.frag", out=self.color_targets(steps), defines=defines, **reads)
         self.draw_backdrop_and_transparent(steps)

@@ -75,7 +75,7 @@ class DeferredMultisampled(DeferredLighting):
             super().record(steps)
             return
         ImageLighting.record(self, steps)
-        reads = {**self.gbuffer_reads(steps), **self.shadow_reads(steps), **self.ambient_reads(steps)}
+        reads = self.gbuffer_reads(steps) | self.direct_reads(steps) | self.ambient_reads(steps) | self.air_reads(steps)
         compared = {name: reads[name] for name in _COMPARED if name in reads}
         steps.fullscreen("deferred_edges.frag", out={"edges": self.edges}, **compared, label="edges")
         difference: dict[str, Any] = {}
@@ -84,7 +84,7 @@ class DeferredMultisampled(DeferredLighting):
         steps.fullscreen(
             "deferred_lighting.frag",
             out=self.color_targets(steps) | difference,
-            defines={"SHADE_ONCE": 1},
+            defines={"SHADE_ONCE": 1, **self.backdrop_defines(steps)},
             label="pixels",
             edges=self.edges,
             **reads,
@@ -139,7 +139,7 @@ class DeferredMultisampled(DeferredLighting):
                 topology="points",
                 command=0 if number else 1,
                 out={**self.color_targets(steps), "marks": self.marks},
-                defines={"ONE_SAMPLE": 1, "TILE": _TILE},
+                defines={"ONE_SAMPLE": 1, "TILE": _TILE, **self.backdrop_defines(steps)},
                 state=State(depth_test=False, depth_write=False, cull="none", stencil=marked),
                 label=f"sample {number}",
                 tiles=self.tiles,

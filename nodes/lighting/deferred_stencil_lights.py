@@ -36,8 +36,9 @@ class DeferredStencilLights(ImageLighting):
     def record(self, steps: Steps) -> None:
         """Record a pass for everything without a volume, two draws per local light, then transparent surfaces."""
         super().record(steps)
-        gbuffer, shadows = self.gbuffer_reads(steps), self.shadow_reads(steps)
-        reads = {**gbuffer, **shadows, **self.ambient_reads(steps)}
+        gbuffer = self.gbuffer_reads(steps) | self.air_reads(steps)
+        shadows = self.shadow_reads(steps)
+        reads = gbuffer | self.direct_reads(steps) | self.ambient_reads(steps)
         defines = {"DIRECTIONALS_ONLY": 1, **self.per_sample(steps), **self.backdrop_defines(steps)}
         steps.fullscreen("deferred_lighting.frag", out=self.color_targets(steps), defines=defines, **reads)
         local = [number for number, light in enumerate(steps.lights) if light.type != "directional"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from rendergraph.api import State, Steps, define
+from rendergraph.api import SceneError, State, Steps, define
 
 from ._lighting import GeometryLighting
 
@@ -18,13 +18,21 @@ class ForwardLighting(GeometryLighting):
     of a pre-pass, no hidden fragment is shaded.
 
     `evaluate` sets how often lighting is computed: per fragment (Phong 1975), per vertex with interpolated colours
-    (Gouraud 1971), or once per face with its normal (flat shading). Textures and shadows are always per fragment.
+    (Gouraud 1971), or once per face with its normal (flat shading). Textures, shadows and `reflections` are always per
+    fragment. Vertices and faces are lit by all lights, whatever the `light_list`.
     """
 
     evaluate: Literal["fragment", "vertex", "face"] = define(default="fragment", doc="How often lighting is computed.")
 
     def record(self, steps: Steps) -> None:
-        """Record a pass over opaque surfaces and one over transparent ones."""
+        """Record a pass over opaque surfaces and one over transparent ones.
+
+        Raises:
+            SceneError: a part of the light is used that only lighting per fragment has.
+        """
+        for part in (self.environment_reflection, self.specular_albedo):
+            if self.evaluate != "fragment" and steps.used(part):
+                raise SceneError(f"'{part.name}' is known per fragment; set evaluate: fragment", part.name)
         super().record(steps)
         shaders: dict[str, Any] = {
             "fragment": {"fragment": "forward_lighting.frag"},
@@ -38,6 +46,10 @@ class ForwardLighting(GeometryLighting):
         # A geometry shader may change depths by a few steps compared with the pre-pass.
         offset = (0.0, 8.0) if self.evaluate == "face" and steps.connected(self.depth) else None
         self.draw_opaque(
-            steps, **shaders, **self.environment_reads(steps), in_place=True, state=State(polygon_offset=offset)
+            steps, **shaders, **self.ambient_reads(steps), in_place=True, state=State(polygon_offset=offset)
         )
         self.draw_backdrop_and_transparent(steps, **shaders, in_place=True)
+
+    def light_list_reads(self, steps: Steps) -> dict[str, Any]:
+        """Return what a shader reads to light a surface by some of the lights; nothing for vertices and faces."""
+        return super().light_list_reads(steps) if self.evaluate == "fragment" else {}

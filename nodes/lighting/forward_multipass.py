@@ -27,7 +27,7 @@ class ForwardMultipass(GeometryLighting):
     def record(self, steps: Steps) -> None:
         """Record ambient light and emission, then each light, then transparent surfaces."""
         super().record(steps)
-        self.draw_opaque(steps, "forward_multipass.frag", defines={"FIRST_PASS": 1}, **self.environment_reads(steps))
+        self.draw_opaque(steps, "forward_multipass.frag", defines={"FIRST_PASS": 1}, **self.ambient_reads(steps))
         added = State(blend=ADD, depth_func="equal", depth_write=False)
         for light in range(len(steps.lights) if self.wants_lights(steps) else 0):
             self.draw_opaque(steps, "forward_multipass.frag", state=added, per_light=light, light=light)

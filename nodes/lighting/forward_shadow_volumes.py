@@ -29,7 +29,7 @@ class ForwardShadowVolumes(CountsVolumes, ForwardMultipass):
     def record(self, steps: Steps) -> None:
         """Record ambient light and emission, then volumes and lighting of each light, then transparent surfaces."""
         GeometryLighting.record(self, steps)
-        self.draw_opaque(steps, "forward_multipass.frag", defines={"FIRST_PASS": 1}, **self.environment_reads(steps))
+        self.draw_opaque(steps, "forward_multipass.frag", defines={"FIRST_PASS": 1}, **self.ambient_reads(steps))
         casting = self.lights(steps.facts)
         for light in range(len(steps.lights) if self.wants_lights(steps) else 0):
             layer = casting.index(light) if light in casting else None

@@ -34,6 +34,7 @@ from rendergraph.steps import Stencil as Stencil
 from rendergraph.steps import StencilFace as StencilFace
 from rendergraph.steps import Steps as Steps
 from rendergraph.steps import ViewMatrices as ViewMatrices
+from rendergraph.textures import Air as Air
 from rendergraph.textures import Albedo as Albedo
 from rendergraph.textures import AlbedoRoot as AlbedoRoot
 from rendergraph.textures import Any as Any
@@ -43,14 +44,18 @@ from rendergraph.textures import Emissive as Emissive
 from rendergraph.textures import EnvironmentLight as EnvironmentLight
 from rendergraph.textures import EnvironmentMap as EnvironmentMap
 from rendergraph.textures import ExposureGain as ExposureGain
+from rendergraph.textures import Irradiance as Irradiance
 from rendergraph.textures import IrradianceSH as IrradianceSH
 from rendergraph.textures import Layout as Layout
+from rendergraph.textures import LightList as LightList
 from rendergraph.textures import LinearDepth as LinearDepth
 from rendergraph.textures import Luminance as Luminance
 from rendergraph.textures import Material as Material
 from rendergraph.textures import Normal as Normal
 from rendergraph.textures import Occlusion as Occlusion
 from rendergraph.textures import Radiance as Radiance
+from rendergraph.textures import Reflectance as Reflectance
+from rendergraph.textures import Reflections as Reflections
 from rendergraph.textures import SceneData as SceneData
 from rendergraph.textures import Semantic as Semantic
 from rendergraph.textures import ShadowLookup as ShadowLookup

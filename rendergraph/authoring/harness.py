@@ -41,6 +41,7 @@ SIZE = (37, 23)
 
 _VALUES = {  # by semantic, of `vec2 at` from 0 to 1 and `float wave` from 0 to 1
     "radiance": "vec4(4.0 * wave * at, 2.0 * wave, 1.0)",
+    "reflections": "vec4(4.0 * wave * at, 2.0 * wave, at.x)",
     "emissive": "vec4(wave * at, 0.0, 1.0)",
     "normal": "vec4(normalize(vec3(2.0 * at - 1.0, 0.5 + wave)), 1.0)",
     "linear_depth": "vec4(1.0 + 9.0 * wave)",
@@ -199,14 +200,19 @@ def _camera(port: str, count: int = 1) -> Any:
 def _function_source(signature: Signature, folder: Path) -> type[Node]:
     """Return a node whose function is neutral where a texture can replace it, and else varies with each argument."""
     shader = f"{signature.name}_fed.glsl"
+    lines = [f"{each.declaration} {{ return {_varied(each)}; }}\n" for each in signature.functions]
+    (folder / shader).write_text("".join(lines), encoding="utf-8")
+    return _node("Called", made=Function(signature, shader=shader, doc="A pattern."))
+
+
+def _varied(signature: Signature) -> str:
     kind, value = signature.declaration.split()[0], signature.neutral
     if signature.texture is None and kind.startswith("vec"):
         arguments = re.findall(r"(\w+)\s+(\w+)\s*[,)]", signature.declaration)
         parts = [f"dot({name}, {of}(0.3))" for of, name in arguments if of in ("vec2", "vec3", "vec4")]
         parts += [f"0.3 * float({name})" for of, name in arguments if of in ("float", "int", "uint", "bool")]
         value = f"{value} + 0.5 + 0.5 * sin({' + '.join(parts) or '0.3'})"
-    (folder / shader).write_text(f"{signature.declaration} {{ return {value}; }}\n", encoding="utf-8")
-    return _node("Called", made=Function(signature, shader=shader, doc="A pattern."))
+    return value
 
 
 # --- readers ---------------------------------------------------------------------------------------------------------
@@ -218,7 +224,8 @@ def _reader(name: str, port: Port, folder: Path) -> type[Node] | None:
     if isinstance(port, Function):
         shader = f"use_{name}.frag"
         (folder / shader).write_text(_call(port.signature), encoding="utf-8")
-        read = Input(port.signature, kind="function", many=True, doc="The function.")
+        many = port.signature.combine != ""
+        read = Input(port.signature, kind="function", many=many, doc="The function.")
         return _node("Caller", read=read, made=value, shader=shader)
     if isinstance(port, Views):
         seen = Input(View, kind="view", doc="The view.")
@@ -254,6 +261,11 @@ def _draw(self: Any, steps: Steps) -> None:
 
 
 def _call(signature: Signature) -> str:
+    body = "vec4 at = fract(gl_FragCoord.xyxy * vec4(0.037, 0.041, 0.043, 0.047)) + 0.1; made = vec4(0.0);"
+    return f"out vec4 made;\nvoid main() {{ {body} {' '.join(map(_added, signature.functions))} }}\n"
+
+
+def _added(signature: Signature) -> str:
     arguments = signature.declaration.partition("(")[2].rpartition(")")[0]
     kinds = [argument.split()[-2] for argument in arguments.split(",") if argument.strip()]
     pattern = {"float": "at.x", "bool": "at.x > 0.5"} | {f"vec{count}": f"vec{count}(at)" for count in (2, 3, 4)}
@@ -261,9 +273,7 @@ def _call(signature: Signature) -> str:
     result = signature.declaration.split()[0]
     column = "result[0]" if "mat" in result else "result"
     value = "vec4(result)" if result in ("float", "int", "uint", "bool") else f"vec4({column}.xxxx)"
-    body = "vec4 at = fract(gl_FragCoord.xyxy * vec4(0.037, 0.041, 0.043, 0.047)) + 0.1;"
-    call = f"{result} result = {signature.name}({values}); made = {value};"
-    return f"out vec4 made;\nvoid main() {{ {body} {call} }}\n"
+    return f"{{ {result} result = {signature.name}({values}); made += {value}; }}"
 
 
 def _node(name: str, *, shader: str | None = None, **attributes: Any) -> type[Node]:

@@ -78,7 +78,7 @@ class NodeCheck:
         except RendergraphError as error:
             if any(isinstance(cause, MemoryError) for cause in cause_chain(error)):
                 raise  # ends the check
-            missing = {problem.subject for problem in error.problems if problem.code == "RG604"}
+            missing = {problem.subject for problem in error.problems if problem.code in ("RG604", "RG209")}
             rest = tuple(name for name in variant.outputs if f"{self.type.name}.{name}" not in missing)
             if len(rest) < len(variant.outputs) and not variant.is_range_end:  # outputs may depend on links and choices
                 self.tried.pop()

@@ -152,6 +152,8 @@ def _alone(name: str, port: Port) -> Iterator[str]:
         wanted, example = (Signature, "ShadowLookup") if port.kind == "function" else (Semantic, "Radiance")
         if not isinstance(port.semantic, wanted):
             yield f"port '{name}': semantic is {quoted(port.semantic)}, not a {wanted.__name__} such as {example}"
+        elif isinstance(port.semantic, Signature) and port.many and not port.semantic.combine:
+            yield f"port '{name}' takes a list, but {port.semantic.name}() of several nodes cannot be joined"
     elif isinstance(port, WrittenPort):
         if port.semantic is None and port.like is None and not isinstance(port, Internal | History):
             yield f"port '{name}' has neither a semantic nor `like`"

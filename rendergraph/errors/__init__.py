@@ -233,7 +233,7 @@ class Misuse(Exception):
 class SceneError(Exception):
     """A node cannot use this scene: raised in a rule of its ports, in `record` or `update`, for users.
 
-    `subject` may name a parameter, whose place is then that of the message.
+    `subject` may name a parameter, whose place is then that of the message, or an output that cannot be used.
     """
 
     def __init__(self, text: str, subject: str = "") -> None:

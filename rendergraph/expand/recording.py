@@ -301,7 +301,8 @@ def _returns_nothing(value: object) -> None:
 def _author_problem(node: GraphNode, error: BaseException) -> Problem:
     who = node_named(node.id, node.type.name)
     if isinstance(error, SceneError):
-        return Problem("RG209", f"{who}: {shown(error, 200)}", node.place)
+        subject = f"{node.id}.{error.subject}"
+        return Problem("RG209", f"{who}: {shown(error, 200)}", node.place, subject=subject)
     problem = author_problem(error, type(node.node), node.type.file)
     if isinstance(error, Misuse):
         return problem.relocate(node.place, code=error.code, context=who)

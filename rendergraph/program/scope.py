@@ -157,8 +157,9 @@ class _Scope:
             by = [one.node for one in self.step.functions if one.signature == signature.name]
             by = [f"node '{node}'" for node in by]
             by += [f"texture '{read.name}'" for read in screen_reads(signature, self.step, self.types[self.step.node])]
-            given = " and ".join(by) or f"no node of this pipeline; it returns {signature.neutral}"
-            yield InScope("functions", signature.declaration, given)
+            without = f"it returns {signature.neutral}" if signature.combine else "it is not defined"
+            given = " and ".join(by) or f"no node of this pipeline; {without}"
+            yield from (InScope("functions", each.declaration, given) for each in signature.functions)
 
     def includes(self, texts: Mapping[str, StageText]) -> Iterator[InScope]:
         """Yield the names of every file except the stages' own, under any condition."""

@@ -181,7 +181,7 @@ class _Program(Struct, frozen=True):
         source = expanded(includes.copy())
         functions = SourceText()
         for signature in signatures_of(step, self.types).values():
-            if calls(source.text, signature.name):
+            if any(calls(source.text, one.name) for one in signature.functions):
                 functions += self._functions(stage, signature, includes)
             if mentions(source.text, f"{signature.name.upper()}_LIGHT_COUNT"):
                 table = self._light_table(signature)
@@ -209,16 +209,22 @@ class _Program(Struct, frozen=True):
         return generated(structs, "the elements of the step's buffers") if structs else SourceText()
 
     def _functions(self, stage: str, signature: Signature, includes: Includes) -> SourceText:
-        """Return the providers' texts with prefixed names, and the function that joins them."""
+        """Return the providers' texts with prefixed names, and the functions that join them."""
         text = SourceText()
-        factors: list[str] = []
-        arguments = ", ".join(signature.arguments)
+        nodes: list[str] = []
         for binding in self.step.functions:
-            if binding.signature != signature.name:
-                continue
-            text += self._provider_text(binding, includes)
-            factors.append(f"result = result {signature.combine} {prefix(binding.node)}{signature.name}({arguments});")
+            if binding.signature == signature.name:
+                text += self._provider_text(binding, includes)
+                nodes.append(binding.node)
         lines: list[str] = []
+        if signature.combine == "":
+            for each in signature.functions if nodes else ():
+                call = f"{prefix(nodes[0])}{each.name}({', '.join(each.arguments)})"
+                lines.append(f"{each.declaration} {{ return {call}; }}")
+            return text + generated(lines, f"{signature.name}() of '{nodes[0]}'") if nodes else text
+        arguments = ", ".join(signature.arguments)
+        join = f"result = result {signature.combine}"
+        factors = [f"{join} {prefix(node)}{signature.name}({arguments});" for node in nodes]
         if stage == "fragment":
             for read in screen_reads(signature, self.step, self.types[self.step.node]):
                 lines.append(f"uniform sampler2DArray {read.name};")
@@ -250,12 +256,10 @@ class _Program(Struct, frozen=True):
         source = includes.expand(file, root=root, prefix=before, plugged=plugged, inherited=node.inherited)
         own = SourceText(tuple(block for block in source.blocks if not block.origin.shared))
         names = declared(own.text)
-        if binding.signature not in names:
-            signature = _declared_signatures(node)[binding.signature]
-            text = (
-                f"{node_named(binding.node, node.name)}: '{binding.shader}' does not define '{signature.declaration}'"
-            )
-            raise InputError(Problem("RG408", text, Origin(file, 1).place()))
+        for each in _declared_signatures(node)[binding.signature].functions:
+            if each.name not in names:
+                text = f"{node_named(binding.node, node.name)}: '{binding.shader}' does not define '{each.declaration}'"
+                raise InputError(Problem("RG408", text, Origin(file, 1).place()))
         macros = {**read_defines(binding.reads, self.resources, self.views), **dict(binding.defines)}
         names |= {*macros, *(name for name, _ in binding.uniforms), *node.cls.parameters()}
         for port in (*node.cls.ports(), *(read.name for read in binding.reads)):

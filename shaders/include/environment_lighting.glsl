@@ -2,9 +2,14 @@
 #include <shading.glsl>
 
 uniform vec3 ambient;
-#if defined(HAS_ENVIRONMENT) && !defined(NEEDS_PHONG) && !defined(NEEDS_NOTHING)
+#if !defined(NEEDS_PHONG) && !defined(NEEDS_NOTHING)
+#ifdef HAS_ENVIRONMENT
 #define HAS_ENVIRONMENT_SPECULAR
+#endif
+#if defined(HAS_ENVIRONMENT) || defined(HAS_REFLECTIONS) || defined(WRITES_SPECULAR_ALBEDO)
+#define HAS_ENVIRONMENT_BRDF
 uniform sampler2D brdf_table;  // split-sum BRDF over (sqrt(NoV), roughness): the reflectance is f0 * x + f90 * y
+#endif
 #endif
 
 // The direction that the specular lobe is looked up in. For anisotropic surfaces the normal is bent towards the normal
@@ -20,6 +25,31 @@ vec3 reflection_direction(Surface s) {
     }
 #endif
     return reflect(-s.view_dir, normal);
+}
+
+// Fraction of the environment's light in the specular lobe that the surface reflects to the viewer: the second factor
+// of the split sum (Karis 2013). The empirical shading models reflect none.
+vec3 specular_reflectance(Surface s) {
+#ifdef HAS_ENVIRONMENT_BRDF
+    float NoV = clamp(dot(s.normal, s.view_dir), 0.0, 1.0);
+    vec2 brdf = textureLod(brdf_table, vec2(sqrt(NoV), s.roughness), 0.0).xy;
+    vec3 reflectance = s.f0 * brdf.x + s.f90 * brdf.y;
+#if MULTIPLE_SCATTERING
+    reflectance *= 1.0 + s.f0 * (1.0 / max(brdf.x + brdf.y, 1e-3) - 1.0);  // see below
+#endif
+    return reflectance;
+#else
+    return vec3(0.0);
+#endif
+}
+
+// Light of the environment in the specular lobe: the first factor of the split sum.
+vec3 prefiltered_environment(Surface s) {
+#if !defined(HAS_ENVIRONMENT_SPECULAR) || ENVIRONMENT_PART == ENVIRONMENT_PART_DIFFUSE
+    return vec3(0.0);
+#else
+    return light_from(reflection_direction(s), clamp(s.roughness, 0.0, 1.0));
+#endif
 }
 
 // Light reflected from the environment, or the ambient constant. The diffuse part is not yet multiplied by the diffuse

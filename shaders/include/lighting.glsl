@@ -1,6 +1,6 @@
-// Direct lighting of a surface. rendergraph provides `shadow()`. With WRITES_SHADOW_DIFFERENCE, visibility is looked up
-// at two positions within the texel instead of at the surface's own. Their mean is used for lighting, and their
-// difference is accumulated.
+// Direct lighting of a surface. rendergraph provides `shadow()`, and with HAS_LIGHT_LIST the list of the lights that
+// may reach a position. With WRITES_SHADOW_DIFFERENCE, visibility is looked up at two positions within the texel instead
+// of at the surface's own. Their mean is used for lighting, and their difference is accumulated.
 #include <lights.glsl>
 #include <luminance.glsl>
 #include <radiance.glsl>
@@ -30,24 +30,38 @@ ReflectedLight direct_lighting(Surface s, int light) {
         irradiance *= light_visibility;
     }
     ReflectedLight reflectance = shade(s, light_dir);
+#if defined(WRITES_IRRADIANCE) && (TERMS == TERMS_ALL || TERMS == TERMS_DIFFUSE)
+    s.diffuse = vec3(1.0);
+    direct_irradiance += PI * shade(s, light_dir).diffuse * irradiance;
+#endif
     return ReflectedLight(reflectance.diffuse * irradiance, reflectance.specular * irradiance);
 #else
     return ReflectedLight(vec3(0.0), vec3(0.0));
 #endif
 }
 
-// Light of all sources; with DIRECTIONALS_ONLY, of the directional lights only.
+// Adds the light of one source; with DIRECTIONALS_ONLY, only of a directional light.
+void add_direct_lighting(Surface s, int light, inout ReflectedLight sum) {
+#if LIGHT_COUNT > 0 && !defined(NO_LIGHTS)
+#ifdef DIRECTIONALS_ONLY
+    if (lights[light].position.w > 0.0) return;
+#endif
+    ReflectedLight reflected = direct_lighting(s, light);
+    sum.diffuse += reflected.diffuse;
+    sum.specular += reflected.specular;
+#endif
+}
+
+// Light of all sources, or of those in the list for the surface's position.
 ReflectedLight direct_lighting(Surface s) {
     ReflectedLight sum = ReflectedLight(vec3(0.0), vec3(0.0));
 #if LIGHT_COUNT > 0 && !defined(NO_LIGHTS)
-    for (int i = 0; i < LIGHT_COUNT; ++i) {
-#ifdef DIRECTIONALS_ONLY
-        if (lights[i].position.w > 0.0) continue;
+#ifdef HAS_LIGHT_LIST
+    int count = light_count(s.position);
+    for (int k = 0; k < count; ++k) add_direct_lighting(s, light_at(k), sum);
+#else
+    for (int i = 0; i < LIGHT_COUNT; ++i) add_direct_lighting(s, i, sum);
 #endif
-        ReflectedLight light = direct_lighting(s, i);
-        sum.diffuse += light.diffuse;
-        sum.specular += light.specular;
-    }
 #endif
     return sum;
 }

@@ -1,12 +1,9 @@
 // Lights every pixel of a G-buffer. With DIRECTIONALS_ONLY the other lights follow in later passes.
 #include <gbuffer_surface.glsl>
 #include <lighting.glsl>
+#include "light_outputs.glsl"
 
 uniform vec3 background;
-out vec4 radiance;  // scene-linear; alpha is coverage
-#ifdef WRITES_DIFFUSE
-out vec4 diffuse;  // the same without the specular part
-#endif
 #ifdef WRITES_SHADOW_DIFFERENCE
 out float shadow_difference;  // of visibility between two sample positions; 1 where samples see different surfaces
 #endif
@@ -42,13 +39,10 @@ void main() {
     shadow_difference = sample_index == 0 ? 1.0 : 0.0;
 #endif
     if (!surface_at(texel, sample_index, s)) {
-#ifdef BACKDROP  // a later pass draws the environment
-        radiance = vec4(0.0);
+#ifdef BACKDROP  // a later pass draws it
+        write_background(vec4(0.0));
 #else
-        radiance = vec4(background, 0.0);
-#endif
-#ifdef WRITES_DIFFUSE
-        diffuse = radiance;
+        write_background(vec4(background, 0.0));
 #endif
         return;
     }
@@ -64,19 +58,13 @@ void main() {
 #endif
         ReflectedLight direct = direct_lighting(s);
         ReflectedLight environment = environment_lighting(s);
-        radiance = vec4(radiance_of(s, direct, environment), 1.0);
+        write_light(s, direct, environment);
 #ifdef WRITES_SHADOW_DIFFERENCE
         if (sample_index != 0 && unshadowed_luminance > 0.0) {
             shadow_difference = min(luminance_difference / unshadowed_luminance, 254.0 / 255.0);
         }
 #endif
-#ifdef WRITES_DIFFUSE
-        diffuse = vec4(radiance_of(s, diffuse_only(direct), diffuse_only(environment)), 1.0);
-#endif
     } else {
-        radiance = vec4(unlit_radiance(s), 1.0);
-#ifdef WRITES_DIFFUSE
-        diffuse = radiance;
-#endif
+        write_unlit(s);
     }
 }

@@ -18,5 +18,6 @@ void main() {
 #ifdef PEELED
     if (!nearer(texelFetch(previous_depth, texel, SAMPLE_INDEX).r, gl_FragCoord.z)) discard;
 #endif
-    layer = vec4(radiance_of(s, direct_lighting(s), environment_lighting(s)) * s.alpha, s.alpha);
+    vec3 color = radiance_of(s, direct_lighting(s), environment_lighting(s));
+    layer = vec4(through_air(s.position, color) * s.alpha, s.alpha);
 }

@@ -4,11 +4,7 @@
 #include <radiance.glsl>
 #define DIRECTION in
 #include "vertex_light_varyings.glsl"
-
-out vec4 radiance;  // scene-linear, premultiplied; alpha is coverage
-#ifdef WRITES_DIFFUSE
-out vec4 diffuse;  // the same without the specular part
-#endif
+#include "light_outputs.glsl"
 
 void main() {
     Surface s = fragment_surface(PASS_VIEW);
@@ -20,14 +16,14 @@ void main() {
         direct.specular += v_shadowed_specular[k] * light_visibility;
     }
 #endif
+#if defined(WRITES_IRRADIANCE) && (TERMS == TERMS_ALL || TERMS == TERMS_DIFFUSE)
+    direct_irradiance = PI * direct.diffuse;
+#endif
     direct.diffuse *= s.diffuse;
 #ifdef HAS_ENVIRONMENT
     ReflectedLight environment = ReflectedLight(v_environment_diffuse, v_environment_specular);
 #else
     ReflectedLight environment = environment_lighting(s);
 #endif
-    radiance = vec4(radiance_of(s, direct, environment) * s.alpha, s.alpha);
-#ifdef WRITES_DIFFUSE
-    diffuse = vec4(radiance_of(s, diffuse_only(direct), diffuse_only(environment)) * s.alpha, s.alpha);
-#endif
+    write_light(s, direct, environment);
 }

@@ -25,7 +25,7 @@ float weight_of(float z) {
 void main() {
     View view = PASS_VIEW;
     Surface s = fragment_surface(view);
-    vec3 color = radiance_of(s, direct_lighting(s), environment_lighting(s));
+    vec3 color = through_air(s.position, radiance_of(s, direct_lighting(s), environment_lighting(s)));
     float z = max(linear_depth(view, gl_FragCoord.z), 0.0) / unit;
     accumulation = vec4(color, 1.0) * s.alpha * weight_of(z);
     revealage = s.alpha;
