@@ -1,6 +1,6 @@
 // Direct lighting of a surface. rendergraph provides `shadow()`, and with HAS_LIGHT_LIST the list of the lights that
-// may reach a position. With WRITES_SHADOW_DIFFERENCE, visibility is looked up at two positions within the texel instead
-// of at the surface's own. Their mean is used for lighting, and their difference is accumulated.
+// may reach a position. With WRITES_SHADOW_DIFFERENCE, visibility is looked up at two positions within the texel
+// instead of at the surface's own. Their mean is used for lighting, and their difference is accumulated.
 #include <lights.glsl>
 #include <luminance.glsl>
 #include <radiance.glsl>
