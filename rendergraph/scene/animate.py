@@ -84,8 +84,12 @@ def _changed(scene: Scene, section: str, name: str, values: Mapping[str, Any]) -
         return _placed_again(scene, name, values)
     if section == "environment":
         turn, intensity = math.radians(values.get("rotate_degrees", 0.0)), values.get("intensity", 1.0)
-        environment = scene.environment and replace(scene.environment, intensity=intensity, rotate=turn)
-        return replace(scene, environment=environment)
+        if scene.environment is None:
+            return scene
+        environment = replace(scene.environment, intensity=intensity, rotate=turn)
+        sun = environment.sunlight  # the only directional light, where there is one
+        lights = tuple(sun if sun is not None and light.type == "directional" else light for light in scene.lights)
+        return replace(scene, environment=environment, lights=lights)
     try:
         if section == "cameras":
             return replace(scene, cameras={**scene.cameras, name: scene_values.camera(name, values)})

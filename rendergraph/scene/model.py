@@ -6,6 +6,7 @@ the origin at the image's top left.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
 from itertools import compress, count
@@ -16,6 +17,7 @@ from typing import Any, Literal, TypeAlias, TypeVar
 import numpy as np
 import numpy.typing as npt
 from msgspec import Struct, field
+from msgspec.structs import replace
 
 from rendergraph.declare import Added
 from rendergraph.declare.extensions import ImageLoader
@@ -306,12 +308,24 @@ class Environment(Struct, frozen=True):
         size: width and height of the decoded image; None if only decoding tells.
         intensity: factor on its radiance.
         rotate: radians about +Y.
+        sun: the sun of a sky, in the directions of the image, for a scene that has no directional light; else None.
     """
 
     image: ImageSource | MadeImage
     size: tuple[int, int] | None
     intensity: float = 1.0
     rotate: float = 0.0
+    sun: Light | None = None
+
+    @property
+    def sunlight(self) -> Light | None:
+        """The sun as a light of the scene, turned and scaled like the image."""
+        if self.sun is None:
+            return None
+        c, s = math.cos(self.rotate), math.sin(self.rotate)
+        x, y, z = self.sun.direction
+        turned = (c * x + s * z, y, c * z - s * x)
+        return replace(self.sun, direction=turned, intensity=self.sun.intensity * self.intensity)
 
 
 class Orbit(Struct, frozen=True):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from rendergraph.document import Value, load, shown
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.keys import Key, Validator, plain
 from rendergraph.scene import scene_keys, scene_values
-from rendergraph.scene.environments import named
+from rendergraph.scene.environments import SKIES, named
 from rendergraph.scene.geometry import rigid
 from rendergraph.scene.mesh_files import MESHES, read_mesh
 from rendergraph.scene.model import (
@@ -218,10 +219,8 @@ class _Reader:
             return None
         self.recipe["environment", ""] = values
         place, file = _value(entry, "file"), values["file"]
-        if file != "sky":
-            for key in ("sun", "turbidity"):
-                if (value := entry.get(key)) is not None and value.data is not None:
-                    self.validator.report(value, "RG321", f"'{key}' goes with `file: sky`", key=True)
+        if not self._check_sky(entry, file, values):
+            return None
         with self._reading_file(place):
             environment = named(file, self.lights, values)
             if environment is None:
@@ -230,6 +229,25 @@ class _Reader:
             turn = math.radians(values.get("rotate_degrees", 0.0))
             return replace(environment, intensity=values.get("intensity", 1.0), rotate=turn)
         return None
+
+    def _check_sky(self, entry: Value, file: str, values: Mapping[str, Any]) -> bool:
+        """Report keys that only skies have, that need each other, or that contradict each other."""
+        given = {key: value for key in scene_keys.SKY_KEYS if (value := entry.get(key)) and value.data is not None}
+        wrong = {} if file in SKIES else {key: f"'{key}' goes with a sky, such as `file: sky`" for key in given}
+        for key, other in (("place", "time"), ("time", "place")):
+            if key in given and other not in given:
+                wrong.setdefault(key, f"'{key}' needs '{other}' beside it")
+        if "time" in given:
+            try:
+                datetime.fromisoformat(values["time"])
+            except ValueError as problem:
+                wrong["time"] = f"'time' is no date and time: {problem}"
+        ways = [key for key in ("sun", "elevation_degrees", "time") if key in given]
+        if len(ways) > 1:
+            wrong.setdefault(ways[1], f"'{ways[0]}' and '{ways[1]}' both say where the sun is; keep one")
+        for key, text in wrong.items():
+            self.validator.report(given[key], "RG321", text, key=True)
+        return not wrong
 
     def _object(self, name: str, entry: Value, materials: Sequence[str]) -> None:
         self._check_name(entry, "material", materials, "materials")

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any
 
 from rendergraph.keys import Codes, Key, MapOf, Table, schema
-from rendergraph.keys.values import FILE, TEXT, choice, color, listed, number, row, scale, vector, version, whole
+from rendergraph.keys.values import FILE, TEXT, choice, color, listed, number, row, scale, vector, version, whole, word
 from rendergraph.scene.shapes import LENGTH, SHAPES
 from rendergraph.typecheck import Brief, JsonSchema, Schema, is_numeric
 
 _DIRECTION = "unit length is not needed"
 
 NAME: Any = Annotated[TEXT, Brief("name")]
+TIME: Any = word(
+    re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?(Z|[+-]\d\d:\d\d)?\Z"),
+    "a date and time such as 2026-06-21T15:30+02:00",
+    "time",
+)
 
 MOST_COPIES = 10_000_000
 """Limit of one number under `repeat`; those of a scene are in `SceneLimits`."""
@@ -179,17 +185,25 @@ CAMERA = Table(
 ENVIRONMENT = Table(
     "environment",
     (
-        Key("file", FILE, "Equirectangular image (.hdr, .exr), or a shipped one: `studio`, `sky`.", required=True),
+        Key("file", FILE, "Equirectangular image (.hdr, .exr), or a shipped one, such as `sky`.", required=True),
         Key("intensity", number(0), "Factor on its radiance.", 1.0),
         Key("rotate_degrees", number(), "Turns it about +Y.", 0.0, "°"),
         Key(
             "sun",
             vector(),
-            f"With `sky`: where sunlight goes, by default as the first directional light; {_DIRECTION}.",
+            f"With a sky: where sunlight goes, by default as the first directional light; {_DIRECTION}.",
         ),
-        Key("turbidity", number(2, 10), "With `sky`: haze, from a very clear day.", 3.0),
+        Key("elevation_degrees", number(-18, 90), "With a sky: height of the sun above the horizon.", unit="°"),
+        Key(
+            "azimuth_degrees", number(), "With a sky: the sun's direction; 0 is -z (north), 90 is +x (east).", unit="°"
+        ),
+        Key("place", row(number(-90, 90), number(-180, 180)), "With `time`: latitude and longitude.", unit="°"),
+        Key("time", TIME, "With `place`: date and time for the sun, with its offset from UTC."),
+        Key("turbidity", number(1, 10), "With a sky: haze, from 1 for clean air.", 1.3),
+        Key("overcast", number(0, 1), "With a sky: clouds, which hide the sun at 1.", 0.0),
     ),
 )
+SKY_KEYS = ("sun", "elevation_degrees", "azimuth_degrees", "place", "time", "turbidity", "overcast")
 
 ORBIT = Table(
     "orbit",

@@ -34,14 +34,18 @@ def key_light(scene: Scene, camera: Camera) -> Light:
 def lit(scene: Scene, camera: Camera, *, bare: bool = False) -> Scene:
     """Return the scene with light; `bare` adds no surroundings.
 
-    A scene with neither lights nor an environment gets a key light and the `studio`. A mesh file cannot say what is
-    around it, so the studio also fills the shadows of its own lights. Files in photometric units have lights that are
-    thousands of times brighter: all of them are scaled by one factor, with a warning.
+    A sky brings its sun, if the scene has no directional light. A scene with neither lights nor an environment gets a
+    key light and the `studio`. A mesh file cannot say what is around it, so the studio also fills the shadows of its
+    own lights. Files in photometric units have lights that are thousands of times brighter: all of them are scaled by
+    one factor, with a warning.
     """
     studio = shipped("studio")
     if not scene.lights and scene.environment is None:
         environment = None if bare else replace(studio, intensity=STUDIO_FILL)
         return replace(scene, lights=(key_light(scene, camera),), environment=environment)
+    if scene.environment is not None and (sun := scene.environment.sunlight) is not None:
+        name = "sun" if all(light.name != "sun" for light in scene.lights) else "sky_sun"
+        return replace(scene, lights=(*scene.lights, replace(sun, name=name)))
     if bare or scene.source is None or scene.source.suffix.lower() in (".yaml", ".yml"):
         return scene
     level = typical_illuminance(scene)
@@ -90,8 +94,10 @@ def _surface_points(scene: Scene) -> tuple[npt.NDArray[np.float64], npt.NDArray[
 
 def _scaled(scene: Scene, factor: float) -> Scene:
     lights = tuple(replace(light, intensity=light.intensity * factor) for light in scene.lights)
+    level = KEY_LUX / factor
+    lux = f"{level:,.0f}" if level >= 10 else f"{level:.2g}"
     text = (
-        f"the lights illuminate by about {KEY_LUX / factor:.3g} lux, so all of them are scaled by {factor:.3g}; "
+        f"the lights illuminate by about {lux} lux, so all of them are scaled by {factor:.3g}; "
         "`--environment none` leaves them as they are"
     )
     place = Place(str(scene.source)) if scene.source else None

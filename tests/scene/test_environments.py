@@ -1,15 +1,21 @@
-"""The shipped environments: the sky against Preetham's formulas written down once more, the studio's boxes."""
+"""The shipped environments: skies with their suns, and the studio's boxes."""
 
 from __future__ import annotations
+
+import math
+from datetime import datetime
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 
-from rendergraph.scene import environments
+from rendergraph.errors import InputError
+from rendergraph.scene import animate, environments
+from rendergraph.scene.load import load
+from rendergraph.scene.model import MadeImage, Scene
 
 Floats = npt.NDArray[np.float64]
-SRGB_TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 
 
 def direction(row: npt.ArrayLike, column: npt.ArrayLike) -> Floats:
@@ -19,71 +25,120 @@ def direction(row: npt.ArrayLike, column: npt.ArrayLike) -> Floats:
     return np.array([np.sin(polar) * np.cos(azimuth), np.cos(polar) + 0 * azimuth, np.sin(polar) * np.sin(azimuth)])
 
 
-def preetham(ahead: Floats, to_sun: Floats, t: float) -> Floats:
-    """Yxy of a direction, Y in kcd/m²: appendix A of the paper, angles in radians."""
-    theta, gamma = float(np.arccos(ahead[1])), float(np.arccos(ahead @ to_sun))
-    sun = float(np.arccos(to_sun[1]))
-    a, b, c, d, e = np.array(
-        [
-            [0.1787 * t - 1.4630, -0.0193 * t - 0.2592, -0.0167 * t - 0.2608],
-            [-0.3554 * t + 0.4275, -0.0665 * t + 0.0008, -0.0950 * t + 0.0092],
-            [-0.0227 * t + 5.3251, -0.0004 * t + 0.2125, -0.0079 * t + 0.2102],
-            [0.1206 * t - 2.5771, -0.0641 * t - 0.8989, -0.0441 * t - 1.6537],
-            [-0.0670 * t + 0.3703, -0.0033 * t + 0.0452, -0.0109 * t + 0.0529],
-        ]
-    )
-
-    def perez(theta: float, gamma: float) -> Floats:
-        found: Floats = (1 + a * np.exp(b / np.cos(theta))) * (1 + c * np.exp(d * gamma) + e * np.cos(gamma) ** 2)
-        return found
-
-    powers = np.array([sun**3, sun**2, sun, 1])
-    x_rows = [[0.00166, -0.00375, 0.00209, 0], [-0.02903, 0.06377, -0.03202, 0.00394]]
-    x_rows += [[0.11693, -0.21196, 0.06052, 0.25886]]
-    y_rows = [[0.00275, -0.00610, 0.00317, 0], [-0.04214, 0.08970, -0.04153, 0.00516]]
-    y_rows += [[0.15346, -0.26756, 0.06670, 0.26688]]
-    turbidity = np.array([t * t, t, 1])
-    luminance = (4.0453 * t - 4.9710) * np.tan((4 / 9 - t / 120) * (np.pi - 2 * sun)) - 0.2155 * t + 2.4192
-    zenith = np.array([luminance, turbidity @ x_rows @ powers, turbidity @ y_rows @ powers])
-    found: Floats = zenith * perez(theta, gamma) / perez(0.0, sun)
-    return found
-
-
-@pytest.mark.parametrize("turbidity", [2.0, 5.0])
-def test_the_sky_is_preethams(turbidity: float) -> None:
-    """Luminance and chromaticity, where the colour is one that a display has."""
-    to_sun = np.array([0.5, 0.7, 0.4]) / np.linalg.norm([0.5, 0.7, 0.4])
-    picture = environments.sky((-0.5, -0.7, -0.4), turbidity, shines=False).astype(np.float64)
-    for row, column in ((10, 40), (60, 100), (90, 300), (100, 480), (40, 256)):
-        luminance, x, y = preetham(direction(row, column), to_sun, turbidity)
-        rgb = picture[row, column, :3]
-        assert rgb.min() > 0
-        xyz = SRGB_TO_XYZ @ rgb
-        assert xyz[1] == pytest.approx(luminance / environments.KCD_PER_UNIT, rel=3e-3)
-        assert (xyz[:2] / xyz.sum()) == pytest.approx([x, y], abs=1e-3)
-
-
-@pytest.mark.parametrize("to_sun", [(0.5, 0.7, 0.4), (-0.6, 0.5, 0.3)])
-def test_the_sun_stands_where_its_light_comes_from(to_sun: tuple[float, float, float]) -> None:
-    """As bright as said on a surface that faces it, where it shines from the picture."""
-    rows, columns = np.mgrid[:256, :512]
-    ahead = direction(rows, columns)
-    weight = np.sin((rows + 0.5) / 256 * np.pi) * (np.pi / 256) * (2 * np.pi / 512)
-    unit = np.array(to_sun) / np.linalg.norm(to_sun)
-    negative = (-to_sun[0], -to_sun[1], -to_sun[2])
-    dim, full = (environments.sky(negative, 3.0, shines=on).astype(np.float64)[..., 1] for on in (False, True))
-    peak = np.unravel_index(int(full.argmax()), full.shape)
-    assert direction(*peak) @ unit > np.cos(np.radians(1))
-    near = np.einsum("iyx,i->yx", ahead, unit) > np.cos(np.radians(2))
-    around = np.median(full[near])
-    lux = ((full - around) * weight)[near].sum()
-    assert lux == pytest.approx(environments.SUN_LUX * 0.94, rel=0.03)  # of its green
-    assert dim.max() < 60
-
-
 def test_the_studios_light_comes_from_above() -> None:
     """Neutral; the box overhead is the brightest, the floor the darkest."""
     picture = environments.studio().astype(np.float64)
     np.testing.assert_array_equal(picture[..., 0], picture[..., 2])
     assert picture[:40].max() == pytest.approx(3.6, rel=1e-3)
     assert picture[200:, :, 0].mean() < 0.2 < picture[:, :, 0].mean() < picture[:56, :, 0].mean()
+
+
+def read(folder: Path, environment: str, rest: str = "") -> Scene:
+    (folder / "scene.yaml").write_text(
+        f"scene: 1\nobjects: {{b: {{shape: box}}}}\nenvironment: {{{environment}}}\n{rest}"
+    )
+    return load(folder / "scene.yaml")
+
+
+def picture(scene: Scene) -> Floats:
+    assert scene.environment is not None
+    assert isinstance(scene.environment.image, MadeImage)
+    return scene.environment.image.make()[..., :3].astype(np.float64)
+
+
+@pytest.mark.parametrize("to_sun", [(0.5, 0.7, 0.4), (-0.6, 0.5, 0.3), (0.2, 0.05, -0.9)])
+def test_the_sun_is_seen_where_its_light_comes_from(tmp_path: Path, to_sun: tuple[float, float, float]) -> None:
+    scene = animate.complete(read(tmp_path, f"file: sky, sun: [{', '.join(str(-v) for v in to_sun)}]"))
+    seen = picture(scene)[..., 0]
+    peak = np.unravel_index(int(seen.argmax()), seen.shape)
+    (sun,) = scene.lights
+    assert direction(*peak) @ -np.array(sun.direction) > math.cos(math.radians(1))
+
+
+def test_the_sun_turns_and_dims_with_its_sky(tmp_path: Path) -> None:
+    """`world_to_environment` of environment.glsl turns a direction by the same angle the other way."""
+    frames = "keyframes: {environment.rotate_degrees: {0: 30, 1: 90}}"
+    scene = animate.complete(read(tmp_path, "file: sky, sun: [-1, -1, 0], intensity: 0.5", frames))
+    still = animate.complete(read(tmp_path, "file: sky, sun: [-1, -1, 0]"))
+    for time, angle in ((0, 30), (1, 90)):
+        (sun,), c, s = animate.at(scene, time).lights, math.cos(math.radians(angle)), math.sin(math.radians(angle))
+        x, y, z = -np.array(sun.direction)
+        assert np.allclose([c * x - s * z, y, s * x + c * z], np.sqrt([0.5, 0.5, 0]))
+        assert sun.intensity == pytest.approx(still.lights[0].intensity / 2)
+
+
+def test_a_scene_with_a_directional_light_keeps_its_own(tmp_path: Path) -> None:
+    scene = animate.complete(read(tmp_path, "file: sky", "lights: {key: {type: directional, direction: [-1, -2, 0]}}"))
+    assert [light.name for light in scene.lights] == ["key"]
+    seen = picture(scene)[..., 0]
+    toward = direction(*np.unravel_index(int(seen.argmax()), seen.shape))
+    assert toward @ np.array([1, 2, 0]) / 5**0.5 > math.cos(math.radians(1)), "the sky follows the light"
+    lamp = "lights: {sun: {type: point, at: [0, 3, 0]}}"
+    assert [light.name for light in animate.complete(read(tmp_path, "file: sky", lamp)).lights] == ["sun", "sky_sun"]
+
+
+def test_clouds_hide_the_sun() -> None:
+    clear, hazy, overcast = (environments.shipped("sky", values={"overcast": o}) for o in (0, 0.5, 1))
+    assert overcast.sun is None
+    assert clear.sun is not None
+    assert hazy.sun is not None
+    assert hazy.sun.intensity == pytest.approx(clear.sun.intensity / 2)
+    assert isinstance(overcast.image, MadeImage)
+    light = overcast.image.make()[..., 1].astype(np.float64)
+    rows = np.arange(256)
+    up = np.cos((rows + 0.5) / 256 * np.pi)
+    weight = np.sin((rows + 0.5) / 256 * np.pi) * (np.pi / 256) * (2 * np.pi)
+    assert (light[:, 0] * weight * np.maximum(up, 0)).sum() == pytest.approx(environments.OVERCAST_LUX, rel=2e-3)
+    assert light[0, 0] == pytest.approx(3 * light[127, 0], rel=0.02), "three times as bright as the horizon"
+
+
+@pytest.mark.parametrize(
+    ("time", "place", "elevation", "azimuth"),
+    [
+        ("2026-06-21T12:00Z", (51.4778, 0), 61.96, 179.4),  # NOAA's solar calculator
+        ("2026-12-21T12:00+01:00", (48.137, 11.575), 18.2, 177.0),
+        ("2026-03-20T06:07:00", (0, 0), 0.0, 90.0),  # an equinox at the equator: the sun rises in the east
+        ("2026-06-21T00:00Z", (69.65, 18.96), 3.8, 17.4),  # the midnight sun of Tromso
+    ],
+)
+def test_sun_position(time: str, place: tuple[float, float], elevation: float, azimuth: float) -> None:
+    x, y, z = environments.sun_position(datetime.fromisoformat(time), *place)
+    assert math.degrees(math.asin(y)) == pytest.approx(elevation, abs=0.4)
+    assert math.degrees(math.atan2(x, -z)) == pytest.approx(azimuth, abs=0.6)
+
+
+def test_ways_to_say_where_the_sun_is(tmp_path: Path) -> None:
+    angles = read(tmp_path, "file: sky, elevation_degrees: 30, azimuth_degrees: 90").environment
+    assert angles is not None
+    assert angles.sun is not None
+    assert np.allclose(angles.sun.direction, [-math.cos(math.pi / 6), -0.5, 0])
+    dated = read(tmp_path, "file: sky, place: [51.4778, 0], time: 2026-06-21T12:00Z").environment
+    assert dated is not None
+    assert dated.sun is not None
+    assert math.degrees(math.asin(-dated.sun.direction[1])) == pytest.approx(61.96, abs=0.4)
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ("file: studio, turbidity: 3", "'turbidity' goes with a sky"),
+        ("file: sky, place: [1, 2]", "'place' needs 'time' beside it"),
+        ("file: sky, time: 2026-06-21T12:00Z", "'time' needs 'place' beside it"),
+        ("file: sky, place: [1, 2], time: 2026-13-21T12:00Z", "'time' is no date and time"),
+        ("file: sky, place: [1, 2], time: noon", "a date and time such as"),
+        ("file: sky, sun: [0, -1, 0], elevation_degrees: 3", "both say where the sun is"),
+    ],
+)
+def test_mistakes(tmp_path: Path, values: str, text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        read(tmp_path, values)
+
+
+def test_the_sun_of_dawn_is_redder_and_never_dimmer_than_the_key_light() -> None:
+    suns = [environments.shipped("sky", values={"elevation_degrees": angle}).sun for angle in (90, 30, 5, 1, -2)]
+    assert suns.pop() is None, "it has set"
+    colors = np.array([np.array(sun.color) * sun.intensity for sun in suns if sun is not None])
+    assert np.all(np.diff(colors[:, 0] / colors[:, 2]) > 0)
+    lux = colors @ [0.2126, 0.7152, 0.0722]
+    np.testing.assert_allclose(lux[:3], environments.SUN_LUX, rtol=1e-5)
+    assert lux[3] < environments.SUN_LUX / 2, "twilight is darker"
