@@ -9,6 +9,7 @@ from msgspec import Struct, field
 from msgspec.structs import astuple
 
 from rendergraph.errors import SceneError, suggestion
+from rendergraph.formatting import format_bytes
 from rendergraph.textures import BufferDesc, EnvironmentMap, Layout, SceneData, Semantic, Signature, TextureDesc
 
 SELECTIONS: Mapping[str, Callable[[bool, bool], bool]] = {
@@ -175,12 +176,24 @@ class SceneDataFacts(Struct, frozen=True):
         triangles: of all objects.
         emitters: triangles that emit light in some frame, of objects that are not hidden.
         textures: the arrays that hold the materials' textures.
+        smaller: images that are smaller than the layers of their array, of which they fill a corner.
     """
 
     bytes: int = 0
     triangles: int = 0
     emitters: int = 0
     textures: tuple[TextureDesc, ...] = ()
+    smaller: int = 0
+
+    @property
+    def note(self) -> str:
+        """What takes the bytes, in one line."""
+        in_arrays = sum(desc.bytes for desc in self.textures)
+        text = f"{format_bytes(self.bytes - in_arrays)} of buffers"
+        if self.textures:
+            listed = [f"{desc.layers} of {desc.width}×{desc.height} {desc.format}" for desc in self.textures]
+            text += f", {format_bytes(in_arrays)} of texture arrays ({'; '.join(listed)})"
+        return text + (f", in which {self.smaller} smaller images fill corners of layers" if self.smaller else "")
 
 
 class Facts(Struct, frozen=True):

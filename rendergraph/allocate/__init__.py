@@ -335,7 +335,8 @@ def _reasons(plan: ResourcePlan) -> dict[str, str]:
         elif resource.role == "history":
             reasons[id] = f"the next frame reads it, before it is written again: one {word}, and nothing shares it"
         elif resource.role == "scene":
-            reasons[id] = "it is uploaded with the scene, and all pipelines that draw that read it"
+            note = f"{resource.note}; " if resource.note else ""
+            reasons[id] = f"{note}it is uploaded with the scene, and all pipelines that draw that read it"
         elif resource.role == "kept":
             reasons[id] = f"it outlives the frame: its {word} is its own, and written when it is new or out of date"
         elif id in schedule.whole_frame:

@@ -132,7 +132,8 @@ def _unused(node: NodeType, active: Collection[str], files: Iterable[Path]) -> I
     for name, port in cls.inputs().items():
         if isinstance(port, Input) and port.kind in ("view", "function"):
             continue
-        in_program = name in active or any(re.fullmatch(rf"{name}_\d+", other) for other in active)
+        of_scene = port.kind == "scene" and any(other.startswith("scene_") for other in active)
+        in_program = name in active or of_scene or any(re.fullmatch(rf"{name}_\d+", other) for other in active)
         not_sampled = getattr(port, "use", "sample") != "sample" or not isinstance(port, Input)
         if not in_program and not not_sampled and not re.search(rf"\.{name}\b", text):
             yield name

@@ -16,7 +16,7 @@ from rendergraph.document import Value
 from rendergraph.errors import Place, Problem, shown_file, suggestion
 from rendergraph.glsl import SourceText, strip_comments
 from rendergraph.glsl.globals import Global, globals_of
-from rendergraph.textures import FORMATS, GLSL_SHAPES, SEMANTICS, SIGNATURES, Semantic, Signature
+from rendergraph.textures import FORMATS, GLSL_SHAPES, SEMANTICS, SIGNATURES, SceneData, Semantic, Signature
 from rendergraph.textures import Any as AnyTexture
 
 _SAMPLER = re.compile(r"[iu]?sampler(2D|2DArray|3D|Cube|2DMS|2DMSArray)(Shadow)?\Z")
@@ -150,7 +150,7 @@ class Entries:
         found = self.declared.get(name)
         if found is None and many:
             found = next((other for other in self.globals.declared if re.fullmatch(rf"{name}_\d+", other.name)), None)
-        keys = ("doc", "optional", "many", "size", "filter", "wrap", "anisotropy", "group")
+        keys = ("doc", "optional", "many", "size", "filter", "wrap", "anisotropy", "group", "rays")
         options: dict[str, Any] = {key: entry[key].data for key in keys if key in entry}
         options |= {"border": _texel(entry["border"])} if "border" in entry else {}
         if found is not None and "kind" in entry:
@@ -187,6 +187,8 @@ class Entries:
         if "kind" in entry:
             return str(entry["kind"].data)
         semantic = str(entry["semantic"].data) if "semantic" in entry else ""
+        if semantic == SceneData.name:
+            return "scene"
         if semantic in [signature.texture for signature in SIGNATURES]:
             return "texture2d_array"  # the function of that signature reads it
         samplers = [g.name for g in self.globals.declared if _SAMPLER.match(g.type) and g.name not in self.header.names]

@@ -116,6 +116,7 @@ INPUT = Table(
         Key("anisotropy", whole(1, 16), "Maximum anisotropy of filtering.", 1),
         Key("border", NUMBER | vector(4), "Value outside its edges, with `wrap: border`.", 1),
         Key("group", word(_NAME, "a word"), "Inputs of one group are connected together."),
+        Key("rays", bool, "With `semantic: scene_data`: the tree for <trace.glsl>, too.", False),
     ),
 )
 OUTPUT = Table(

@@ -24,6 +24,7 @@ from rendergraph.compile.transfers import clear_buffer, image_calls, transfer_ca
 from rendergraph.compile.units import Units
 from rendergraph.compile.uploads import UploadedValues
 from rendergraph.compile.views import ViewBuffers
+from rendergraph.errors import InputError, RenderError
 from rendergraph.expand import ViewTable
 from rendergraph.gl import state as gl_state
 from rendergraph.gl.device import Device
@@ -31,7 +32,16 @@ from rendergraph.gl.programs import Program
 from rendergraph.gl.queries import OcclusionQuery, Timer
 from rendergraph.gl.raw import RawGL
 from rendergraph.gl.textures import Clear, poison_value
-from rendergraph.program import StepTexts, Texts, check_kept_text, declared_blocks, positions_macro
+from rendergraph.glsl.reachable import compiled_text
+from rendergraph.program import (
+    StageText,
+    StepTexts,
+    Texts,
+    check_kept_text,
+    check_scene_includes,
+    declared_blocks,
+    positions_macro,
+)
 from rendergraph.program.limits import check_plan, groups_of
 from rendergraph.program.variants import FIXED_BLOCKS, view_count
 from rendergraph.schedule import step_names
@@ -359,11 +369,16 @@ class _Compiler(Struct, eq=False, dict=True):
             if "scene_previous_block" in used:
                 held["scene_previous_block"] = self.scene.previous()
                 self.uses_previous = True
+            self._check_stages(step, texts())
             for block in sorted(used & held.keys()):
                 blocks[block] = storage
                 buffers.append(partial(held[block].bind_to_storage_buffer, storage))
                 storage += 1
-        program = self.programs.get(texts(), blocks, outputs)
+        try:
+            program = self.programs.get(texts(), blocks, outputs)
+        except InputError:  # the driver only knows that names are missing
+            check_scene_includes(step, texts(), self.types)
+            raise
         for name in before_views.keys() & program.block_names:
             self.views.keep_previous(before_views[name])
         binds: list[Call] = buffers
@@ -384,6 +399,15 @@ class _Compiler(Struct, eq=False, dict=True):
         check_kept_text(step, texts, cls, resources)
         check_program(step, program, texts, resources, uniforms, blocks, sampled, cls)
         return program, binds, uniforms
+
+    def _check_stages(self, step: Step, texts: Mapping[str, StageText]) -> None:
+        """Refuse more storage blocks than a stage of this device may have; vertex shaders may have none."""
+        for stage, text in texts.items():
+            count = sum(storage == "buffer" for storage, _, _ in declared_blocks(compiled_text(text.text)))
+            if count > self.device.limits[f"{stage}_storage"]:
+                what = f"its {stage} shader has {count} storage blocks with those of the scene, "
+                what += f"this device supports {self.device.limits[f'{stage}_storage']} there"
+                raise RenderError(step.problem("RG435", f"{what}; fragment and compute shaders have at least 8"))
 
     def _sample_positions(self, step: Step) -> dict[str, str]:
         """Where the device has the samples of what a step draws to and reads."""

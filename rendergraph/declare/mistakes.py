@@ -14,7 +14,7 @@ from rendergraph.declare.node import Node
 from rendergraph.declare.parameters import Parameter
 from rendergraph.errors import Problem, is_interruption, suggestion
 from rendergraph.ports import Function, History, InOut, Input, Internal, Output, Port, Views, WrittenPort
-from rendergraph.textures import Semantic, Signature
+from rendergraph.textures import SceneData, Semantic, Signature
 from rendergraph.typecheck import accepts, mistakes_in, mistakes_of, parts_of, quoted
 
 _IDENTIFIER = re.compile(r"[a-z][a-z0-9_]*\Z")
@@ -154,6 +154,10 @@ def _alone(name: str, port: Port) -> Iterator[str]:
             yield f"port '{name}': semantic is {quoted(port.semantic)}, not a {wanted.__name__} such as {example}"
         elif isinstance(port.semantic, Signature) and port.many and not port.semantic.combine:
             yield f"port '{name}' takes a list, but {port.semantic.name}() of several nodes cannot be joined"
+        elif port.kind == "scene" and (port.semantic != SceneData or port.many):
+            yield f"port '{name}' is a scene; declare it as Input(SceneData), of which there is one"
+        elif port.rays and port.kind != "scene":
+            yield f"port '{name}' has rays, but is not the scene's data; declare it as Input(SceneData, rays=True)"
     elif isinstance(port, WrittenPort):
         if port.semantic is None and port.like is None and not isinstance(port, Internal | History):
             yield f"port '{name}' has neither a semantic nor `like`"

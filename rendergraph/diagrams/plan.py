@@ -115,6 +115,8 @@ def _resource_json(plan: ResourcePlan, id: str) -> dict[str, Any]:
     facts: dict[str, Any] = {"id": id, "role": resource.role, "bytes": plan.bytes(id), "kind": "buffer"}
     if isinstance(resource.desc, TextureDesc):
         facts |= {"kind": resource.desc.kind, **texture_json(resource.desc)}
+    if resource.role == "scene":
+        facts["scene_bytes"] = resource.desc.bytes
     facts |= {"first": life.first, "last": life.last}
     return facts | {"physical": list(plan.placement[id]), "reason": plan.reasons[id]}
 
@@ -196,6 +198,8 @@ def _memory_rows(plan: ResourcePlan) -> list[tuple[str, ...]]:
     ]
     if memory.peak_node is None:
         del rows[2]
+    taken = sum(resource.desc.bytes for resource in plan.resources.values() if resource.note)
+    rows.append(("  scene", taken or None, "of its data, beside the above"))
     return [(name, format_bytes(count), text) for name, count, text in rows if count is not None]
 
 

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from rendergraph.declare import Function, History, InOut, Input, Internal, Node, Part, Port, Views, WrittenPort
 from rendergraph.errors import InputError
-from rendergraph.expand.model import CAMERA, OF_SCENE, VersionedSteps, ViewTable, follow_forwards
+from rendergraph.expand.model import CAMERA, OF_SCENE, SCENE_DATA, VersionedSteps, ViewTable, follow_forwards
 from rendergraph.expand.recording import Recording, is_kept
 from rendergraph.expand.targets import overlap, parts_written, refusals, target_size
 from rendergraph.link import Endpoint, Graph
@@ -53,7 +53,8 @@ class _VersionAssignment:
         self.resources: dict[str, Resource] = {}
         for semantic, end in OF_SCENE.items():
             for info in graph.facts.of_scene(semantic):
-                self.resources[end.port] = Resource(end.port, info.storage, "scene")
+                note = graph.scene_data.note if end == SCENE_DATA and graph.scene_data is not None else ""
+                self.resources[end.port] = Resource(end.port, info.storage, "scene", note=note)
                 self.final[end] = end.port, 0
         self.views: dict[str, ViewTable] = {CAMERA: ViewTable()}
         self.steps: list[Step] = []

@@ -240,6 +240,10 @@ def _wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
         "color_targets": min(raw.integer(0x8CDF), raw.integer(0x8824)),  # attachments, draw buffers
         "images": raw.integer(0x8F38),
         "storage_bindings": raw.integer(0x90DD),
+        "vertex_storage": raw.integer(0x90D6),  # blocks
+        "geometry_storage": raw.integer(0x90D7),
+        "fragment_storage": raw.integer(0x90DA),
+        "compute_storage": raw.integer(0x90DB),
         **{f"groups_{axis}": raw.integer(0x91BE, number) for number, axis in enumerate("xyz")},
     }
     limits["depth_bounds"] = int("GL_EXT_depth_bounds_test" in ctx.extensions)

@@ -93,7 +93,7 @@ class Checker(Struct, eq=False):
         filtered = whole and self.infer.sampler(draft, port).filter != "nearest"
         return "is filtered, so no whole numbers" if filtered else ""
 
-    def _report(self, draft: UnlinkedNode, port: Port, link: Link, mismatch: _Mismatch) -> None:
+    def _report(self, draft: UnlinkedNode, port: Input | InOut, link: Link, mismatch: _Mismatch) -> None:
         code, expected, given, converts = mismatch
         where = line_of(self.nodes[link.source.node].spec.place, link.value.place)
         text = f"'{draft.spec.id}.{port.name}' {expected}, but '{link.source}' ({where}) {given}"
@@ -102,6 +102,8 @@ class Checker(Struct, eq=False):
         way = way or self._converters(converts)
         if not way and code == "RG216":
             way = '; a node that can read other sizes declares the input with size="any"'
+        if not way and port.kind == "scene":
+            way = "; leave it out, and it reads the scene of the pipeline"
         if not way and code == "RG201":
             way = self._fitting(port, link, [other for other in self.nodes.values() if other is not draft])
         self.problems.append(link.value.problem(code, text + way))

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from rendergraph.program.checks import Texts as Texts
 from rendergraph.program.checks import check_kept_text as check_kept_text
+from rendergraph.program.checks import check_scene_includes as check_scene_includes
 from rendergraph.program.checks import check_texts as check_texts
 from rendergraph.program.checks import declared_blocks as declared_blocks
 from rendergraph.program.checks import named_reads as named_reads

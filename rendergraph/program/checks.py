@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache, partial
 
 from rendergraph.catalog import NodeType
-from rendergraph.declare import Node
+from rendergraph.declare import Input, Node
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.expand import ViewTable
 from rendergraph.glsl.globals import globals_of
@@ -33,6 +33,7 @@ _MOVING = {
     "scene_previous_block": "where the objects were in the frame before",
 }
 _OF_SCENE_DATA = ("light_block", "material_block")
+_OF_SCENE = ("scene.glsl", "previous_scene.glsl", "trace.glsl")
 _SAMPLER = r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?([iu]?sampler\w+)\s+([^;]+);"
 _NAME = r"[A-Za-z_]\w*"
 _BRACES = r"(?:\A|(?<=[;{}]))([^;{}]*)\{([^{}]*)\}(?=\s*([A-Za-z_]\w*)?)"
@@ -71,6 +72,7 @@ def _check_step(
     views: Mapping[str, ViewTable],
 ) -> tuple[Problem, ...]:
     texts = stage_texts(step, types, resources, views)
+    check_scene_includes(step, texts, types)
     check_kept_text(step, partial(dict, texts), types[step.node].cls, resources)
     _check_samplers(step, texts, resources)
     _check_outs(step, texts, types[step.node].cls, resources)
@@ -163,6 +165,32 @@ def _check_outs(step: Step, texts: Mapping[str, StageText], cls: type[Node], res
         problems = unfit_outputs(step, outs, cls, resources)
         if problems:
             raise InputError([_placed(problem, text, [problem.subject]) for problem in problems])
+
+
+def check_scene_includes(step: Step, texts: Mapping[str, StageText], types: Mapping[str, NodeType]) -> None:
+    """Refuse includes about the scene's data in steps that do not read it (RG430)."""
+    nodes = [step.node, *(function.node for function in step.functions)]
+    inputs = [port for node in nodes for port in types[node].cls.inputs().values() if isinstance(port, Input)]
+    traces = step.reads_scene and any(port.rays for port in inputs)
+    problems = []
+    for text in texts.values():
+        for block in text.source.blocks:
+            name, origin = block.origin.file.name if block.origin.file is not None else "", block.origin
+            if not origin.shared or name not in _OF_SCENE or traces or (step.reads_scene and name != "trace.glsl"):
+                continue
+            while origin.by is not None and origin.shared:
+                origin = origin.by
+            trace = name == "trace.glsl"
+            lacks = f"it includes <{name}>, but does not read {'rays' if step.reads_scene else 'the scene'}; "
+            way = (
+                f"declare `scene = Input(SceneData{', rays=True' if trace else ''})` and give the step scene=self.scene"
+            )
+            if types[step.node].is_shader:
+                way = f"add scene: {{semantic: scene_data{', rays: true' if trace else ''}}} to `inputs` of its header"
+            problem = step.problem("RG430", lacks + way)
+            problems.append(problem.relocate(origin.place(), f"#include <{name}>"))
+    if problems:
+        raise InputError(list(dict.fromkeys(problems)))
 
 
 def _always(text: str) -> str:

@@ -50,7 +50,7 @@ Stored: TypeAlias = tuple[ImageSource, bool, str, str]
 
 
 class TextureArrays(NamedTuple):
-    """The arrays that hold a scene's textures, and array and layer of each of them.
+    """The arrays that hold a scene's textures, array and layer of each, and how many are smaller than their layer.
 
     Textures of one format and size share an array. Where that makes more than `MOST_ARRAYS`, arrays of one format are
     joined, those first for which that takes the fewest bytes: a smaller image then fills a corner of its layer.
@@ -58,6 +58,7 @@ class TextureArrays(NamedTuple):
 
     arrays: tuple[TextureDesc, ...]
     places: Mapping[Stored, tuple[int, int]]
+    smaller: int
 
 
 def stored(texture: Texture) -> Stored:
@@ -98,7 +99,8 @@ def texture_arrays(descs: Mapping[Stored, TextureDesc]) -> TextureArrays:
         for (name, width, height), keys in groups.items()
     ]
     places = {key: (a, layer) for a, keys in enumerate(groups.values()) for layer, key in enumerate(keys)}
-    return TextureArrays(tuple(arrays), places)
+    smaller = sum(descs[key].size != (width, height) for (_, width, height), keys in groups.items() for key in keys)
+    return TextureArrays(tuple(arrays), places, smaller)
 
 
 def _added_bytes(pair: Sequence[tuple[str, int, int]], groups: Mapping[tuple[str, int, int], list[Stored]]) -> int:
@@ -141,6 +143,7 @@ def scene_data_facts(scene: Scene) -> SceneDataFacts:
         + 16 * len(SLOTS) * len(scene.materials) * bool(textures.arrays)
         + sum(desc.bytes for desc in textures.arrays),
         textures=textures.arrays,
+        smaller=textures.smaller,
         triangles=sum(len(scene.meshes[placed.mesh].indices) for placed in scene.objects),
         emitters=emitters,
     )
@@ -163,7 +166,8 @@ def data_macros(scene: Scene, packed: PackedScene, arrays: TextureArrays) -> dic
         **{f"SCENE_{name.upper()}": str(bit) for name, bit in FLAGS.items()},
     }
     macros |= {f"SCENE_{name.upper()}_STREAM": "1" for name in _OPTIONAL if getattr(packed, name) is not None}
-    macros["SCENE_ARRAY_COUNT"] = str(len(arrays.arrays))
+    if arrays.arrays:
+        macros |= {"SCENE_TEXTURES": "1", "SCENE_ARRAY_COUNT": str(len(arrays.arrays))}
     used = dict.fromkeys(SLOTS, 0)
     for material in scene.materials:
         for slot, texture in material.textures.items():

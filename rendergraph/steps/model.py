@@ -252,6 +252,7 @@ class Resource(Struct, frozen=True, gc=False):
         first: every channel's value before the first frame, for history.
         view: id of the view table it is rendered with.
         lights: the scene's light index of each layer.
+        note: what it consists of, where a description cannot say that.
     """
 
     id: str
@@ -260,6 +261,7 @@ class Resource(Struct, frozen=True, gc=False):
     first: float = 0.0
     view: str | None = None
     lights: tuple[int, ...] = ()
+    note: str = ""
 
     @property
     def bytes(self) -> int:

@@ -52,7 +52,7 @@ struct SceneEmitter {
     int triangle;
 };
 
-#if SCENE_ARRAY_COUNT > 0
+#ifdef SCENE_TEXTURES
 // Of each material its 8 slots: array (-1 without a texture), layer, width | height << 16, and bits: UV set, 2 without
 // filtering, 4 and 16 times the wrap mode along s and t (0 repeat, 1 mirror, 2 clamp).
 layout(std430) readonly buffer scene_texture_block {
@@ -216,7 +216,7 @@ SceneCoordinates scene_coordinates(ivec3 v, vec3 w) {
     return c;
 }
 
-#if SCENE_ARRAY_COUNT > 0
+#ifdef SCENE_TEXTURES
 float scene_wrapped(float u, int mode) {
     float mirrored = 1.0 - abs(mod(u, 2.0) - 1.0);
     return mode == 0 ? fract(u) : mode == 1 ? mirrored : clamp(u, 0.0, 1.0);
@@ -235,26 +235,26 @@ bool scene_texel(int instance, int slot, int arrays, SceneCoordinates c, out vec
     vec2 at = size * vec2(scene_wrapped(uv.x, (entry.w >> 2) & 3), scene_wrapped(uv.y, (entry.w >> 4) & 3));
     if ((entry.w & 2) != 0) at = min(floor(at), size - 1.0) + 0.5;
     vec3 place = vec3(at + 1.0, entry.y);
-#define SCENE_SAMPLE(number)                                             \
-    if ((arrays & (1 << number)) != 0 && entry.x == number) {            \
-        place.xy /= vec2(textureSize(scene_array_##number, 0).xy);       \
-        texel = textureLod(scene_array_##number, place, 0.0);            \
+#define SCENE_SAMPLE(number, array)                           \
+    if ((arrays & (1 << number)) != 0 && entry.x == number) { \
+        place.xy /= vec2(textureSize(array, 0).xy);           \
+        texel = textureLod(array, place, 0.0);                \
     }
-    SCENE_SAMPLE(0)
+    SCENE_SAMPLE(0, scene_array_0)
 #if SCENE_ARRAY_COUNT > 1
-    SCENE_SAMPLE(1)
+    SCENE_SAMPLE(1, scene_array_1)
 #endif
 #if SCENE_ARRAY_COUNT > 2
-    SCENE_SAMPLE(2)
+    SCENE_SAMPLE(2, scene_array_2)
 #endif
 #if SCENE_ARRAY_COUNT > 3
-    SCENE_SAMPLE(3)
+    SCENE_SAMPLE(3, scene_array_3)
 #endif
 #if SCENE_ARRAY_COUNT > 4
-    SCENE_SAMPLE(4)
+    SCENE_SAMPLE(4, scene_array_4)
 #endif
 #if SCENE_ARRAY_COUNT > 5
-    SCENE_SAMPLE(5)
+    SCENE_SAMPLE(5, scene_array_5)
 #endif
 #undef SCENE_SAMPLE
     return true;
@@ -333,7 +333,7 @@ Surface scene_surface(int instance, int triangle, vec2 barycentrics, vec3 view_d
     s.normal = normalize(normal);
 
     MaterialTexels texels = no_texels();
-#if SCENE_ARRAY_COUNT > 0
+#ifdef SCENE_TEXTURES
     vec4 texel;
 #endif
 #ifdef SCENE_METALLIC_ROUGHNESS_ARRAYS

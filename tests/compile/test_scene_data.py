@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,9 +13,13 @@ import pytest
 from msgspec.structs import replace
 
 import rendergraph as rg
+from rendergraph.api import Any as Anything
+from rendergraph.api import DisplayColor, Function, Input, Node, Output, SceneData, ShadowLookup, Steps
 from rendergraph.compile import GpuScene
-from rendergraph.errors import InputError
-from rendergraph.scene.model import Texture
+from rendergraph.errors import InputError, RenderError
+from rendergraph.scene import scene_data
+from rendergraph.scene.model import ImageSource, Texture
+from rendergraph.textures import TextureDesc
 
 SHADERS = {
     # The corners' weights come from a geometry shader, so that nothing of the scene's data decides where a pixel lies.
@@ -195,6 +201,15 @@ def test_textured_surfaces_are_too(gl: rg.Session, plugins: Path, shared: Path, 
     check(surfaces(gl, plugins, shared / "assets" / "gltf" / name))
 
 
+@pytest.mark.usefixtures("level_0")
+def test_images_of_many_sizes_share_an_array(
+    gl: rg.Session, plugins: Path, shared: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Here two sizes in one array, with all wrap modes and filters: a smaller image fills the corner of its layer."""
+    monkeypatch.setattr(scene_data, "MOST_ARRAYS", 1)
+    check(surfaces(gl, plugins, shared / "assets" / "gltf" / "TextureSettingsTest.glb"))
+
+
 @pytest.mark.nightly
 @pytest.mark.usefixtures("level_0")
 def test_surfaces_of_every_asset_are_too(gl: rg.Session, plugins: Path, shared: Path) -> None:
@@ -210,3 +225,247 @@ def test_surfaces_of_every_asset_are_too(gl: rg.Session, plugins: Path, shared: 
         check(frame)
         drawn += 1
     assert drawn > 30
+
+
+# Changes of the scene ------------------------------------------------------------------------------------------------
+
+BOXES = """
+cameras: {main: {eye: [0, 1, 6], target: [0, 0, 0]}}
+lights: {sun: {type: directional, direction: [-1, -2, -1]}}
+materials: {red: {base_color: [1, 0, 0]}, green: {base_color: [0, 1, 0], emissive: [1, 1, 1]}}
+objects:
+  one: {shape: box, material: red}
+  two: {shape: box, material: green, at: [2, 0, 0], scale: [-1, 1, 1], casts_shadow: false}
+  three: {shape: plane, material: red, at: [0, -1, 0]}
+"""
+PLACE = """
+#include <scene.glsl>
+out vec4 color;
+void main() { color = vec4(scene_position(0, 0, vec2(0.0)), scene_instances[1].rows[0].w); }
+"""
+COLOR = """
+#include <scene.glsl>
+out vec4 color;
+void main() { color = materials[1].base_color; }
+"""
+LIGHT = """
+#include <scene.glsl>
+#include <lights.glsl>
+out vec4 color;
+void main() { color = lights[0].color; }
+"""
+BEFORE = """
+#include <previous_scene.glsl>
+out vec4 color;
+void main() { color = vec4(scene_previous_position(0, 0, vec2(0.0)), 1.0); }
+"""
+
+
+class Of(Node):
+    """One texel of the scene's data."""
+
+    scene = Input(SceneData, doc="Scene.")
+    color = Output(Anything, format="rgba32f", size=(1, 1), doc="Texel.")
+    kept = Output(Anything, format="rgba32f", size=(1, 1), kept=True, doc="The same.")
+
+    def record(self, steps: Steps) -> None:
+        for out in (self.color, self.kept):
+            if steps.used(out):
+                steps.fullscreen("of.frag", scene=self.scene, out={"color": out})
+
+
+ONE, KEPT = "nodes: {a: {type: of}}\noutputs: {image: a.color}\n", "nodes: {a: {type: of}}\noutputs: {image: a.kept}\n"
+
+
+def ran(bench: Any, text: str, shader: str, moving: str, frames: int = 5) -> tuple[list[int], list[Any]]:
+    """How many steps each frame runs, and its texel; what moves does so from frame 2 to 3 and stays there."""
+    scene = BOXES + f"keyframes: {{{moving}}}\n"
+    pipeline = bench.pipeline(text, Of, shaders={"of.frag": shader}, scene=scene)
+    shown = list(
+        bench.session.frames(pipeline, frames=range(1, frames + 1), fps=1, reuse=True, timed=True, warm_up=False)
+    )
+    return [frame.times[-1].ran for frame in shown], [frame["image"][0, 0].tolist() for frame in shown]
+
+
+MOVES = "objects.one.at: {1: [0, 0, 0], 2: [0, 3, 0]}"
+PALES = "materials.green.base_color: {1: [0, 1, 0], 2: [1, 1, 1]}"
+
+
+DIMS = "lights.sun.intensity: {1: 1, 2: 3}"
+
+
+@pytest.mark.parametrize("text", [ONE, KEPT], ids=["each frame", "kept"])
+@pytest.mark.parametrize(("shader", "moving"), [(PLACE, MOVES), (COLOR, PALES), (LIGHT, DIMS)])
+def test_a_step_runs_again_where_what_it_looks_at_has_changed(bench: Any, text: str, shader: str, moving: str) -> None:
+    """In the first frame, and in that in which the part of the scene changes that it looks at."""
+    counts, texels = ran(bench, text, shader, moving)
+    assert counts == [1, 0, 1, 0, 0]
+    assert texels[0] == texels[1] != texels[2] == texels[3] == texels[4]
+    for other in {MOVES, PALES, DIMS} - {moving}:
+        assert ran(bench, text, shader, other)[0] == [1, 0, 0, 0, 0]
+
+
+def test_the_frame_before_is_that_of_the_scene(bench: Any) -> None:
+    counts, texels = ran(bench, ONE, BEFORE, MOVES)
+    assert counts == [1, 0, 1, 1, 0]  # it looks at the records of instances, too
+    assert [texel[1] - texels[0][1] for texel in texels] == [0, 0, 0, 3, 3]
+    with pytest.raises(InputError, match=r"RG439 .* where the objects were in the frame before"):
+        ran(bench, KEPT, BEFORE, MOVES)
+
+
+def test_a_kept_value_of_the_scene_is_not_that_of_another(bench: Any) -> None:
+    first, second = (ran(bench, KEPT, COLOR, PALES, frames=1) for _ in range(2))
+    other = bench.draw(
+        KEPT, Of, shaders={"of.frag": COLOR}, scene=BOXES.replace("[0, 1, 0], emissive", "[0, 0, 1], emissive")
+    )
+    assert first[1] == second[1] == [[0, 1, 0, 1]]
+    assert other["image"][0, 0].tolist() == [0, 0, 1, 1]
+
+
+# Cost and limits -----------------------------------------------------------------------------------------------------
+
+
+def test_facts_know_the_bytes_and_only_readers_pay(bench: Any) -> None:
+    noted: list[Any] = []
+
+    class Asks(Of):
+        """One texel, and what is known before."""
+
+        def record(self, steps: Steps) -> None:
+            noted.append((steps.facts.scene_data, steps.facts.input("scene").bytes, steps.connected(self.scene)))
+            super().record(steps)
+
+    pipeline = bench.pipeline(ONE.replace("of}", "asks}"), Asks, shaders={"of.frag": PLACE}, scene=BOXES)
+    plain = rg.load("deferred", scene=bench.folder / "scene.yaml")
+    assert plain.link().graph.scene_data is None
+    with bench.session.current():
+        assert bench.session.compile(plain).scene._data is None
+    with bench.session.current():
+        data = bench.session.compile(pipeline).scene.data
+        held = sum(buffer.size for name, buffer in data.buffers.items() if name != "scene_texture_block")
+    facts, size, connected = noted[0]
+    assert connected
+    assert facts.bytes == size == held
+    assert (facts.triangles, facts.emitters, facts.textures) == (12 + 12 + 2, 12, ())
+
+
+def test_a_plan_says_what_the_data_consists_of(bench: Any) -> None:
+    planned = bench.pipeline(ONE, Of, shaders={"of.frag": PLACE}, scene=BOXES).plan()
+    assert planned.reasons["the scene's data"].startswith("1.9 KiB of buffers; it is uploaded with the scene")
+    assert planned.memory.no_reuse_bytes == 16  # nothing of it is the pipeline's
+
+
+def _image(number: int) -> scene_data.Stored:
+    return ImageSource(Path(f"{number}.png")), True, "repeat", "repeat"
+
+
+def test_arrays_are_joined_where_that_costs_least() -> None:
+    sides = [(1024, 1024), (1024, 1024), (1000, 1024), (512, 512), (256, 256), (64, 64), (32, 32), (8, 8)]
+    descs = {_image(n): TextureDesc("texture2d", "srgb8_a8", *size) for n, size in enumerate(sides)}
+    found = scene_data.texture_arrays(descs)
+    shapes = sorted((desc.width - 2, desc.height - 2, desc.layers) for desc in found.arrays)
+    assert shapes == [(32, 32, 2), (64, 64, 1), (256, 256, 1), (512, 512, 1), (1000, 1024, 1), (1024, 1024, 2)]
+    assert len(set(found.places.values())) == len(sides)
+    assert found.smaller == 1
+    other = {_image(9): TextureDesc("texture2d", "rgba8", 8, 8)}
+    assert {desc.format for desc in scene_data.texture_arrays(descs | other).arrays} == {"srgb8_a8", "rgba8"}
+
+
+PULLED = """
+#include <scene.glsl>
+#include <pass_view.glsl>
+void main() {
+    int instance = gl_VertexID / 36 == 0 ? 0 : 1;
+    vec3 corner = vec3(gl_VertexID % 3 == 0, gl_VertexID % 3 == 1, gl_VertexID % 3 == 2);
+    vec3 position = scene_position(instance, gl_VertexID % 36 / 3, corner.yz);
+    gl_Position = PASS_VIEW.view_projection * vec4(position, 1.0);
+}
+"""
+WHITE = "out vec4 color;\nvoid main() { color = vec4(1.0); }\n"
+
+
+class Pulled(Node):
+    """Boxes whose vertex shader fetches its vertices, and the same by a geometry step."""
+
+    scene = Input(SceneData, doc="Scene.")
+    pulled = Output(DisplayColor, format="rgba8", clear=0.0, doc="Fetched.")
+    drawn = Output(DisplayColor, format="rgba8", clear=0.0, doc="Drawn.")
+
+    def record(self, steps: Steps) -> None:
+        steps.draw("white.frag", vertex="pulled.vert", vertices=72, scene=self.scene, out={"color": self.pulled})
+        steps.geometry("white.frag", objects=["one", "two"], out={"color": self.drawn})
+
+
+def test_vertex_shaders_read_the_scene_where_the_device_has_storage_blocks(
+    bench: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "nodes: {a: {type: pulled}}\noutputs: {pulled: a.pulled, drawn: a.drawn}\n"
+    shaders = {"white.frag": WHITE, "pulled.vert": PULLED}
+    frame = bench.draw(text, Pulled, shaders=shaders, scene=BOXES, size=(64, 48))
+    np.testing.assert_array_equal(frame["pulled"], frame["drawn"])
+    assert 0.02 < (frame["pulled"][..., 0] > 0).mean() < 0.9
+    monkeypatch.setitem(bench.session.device.limits, "vertex_storage", 0)
+    with pytest.raises(RenderError, match=r"RG435 .* its vertex shader has 4 storage blocks .* supports 0 there"):
+        bench.draw(text, Pulled, shaders=shaders, scene=BOXES, size=(32, 24))
+
+
+class Dim(Node):
+    """A shadow of the colour of the second object's material: functions read the scene as well."""
+
+    scene = Input(SceneData, doc="Scene.")
+    lookup = Function(ShadowLookup, "dim.glsl", reads=("scene",), doc="Visibility.")
+
+
+DIM = """
+#include <scene.glsl>
+float shadow(int light, vec3 position, vec3 normal) {
+    return 0.5 * scene_surface(1, 0, vec2(0.2), vec3(0.0, 0.0, 1.0)).base_color.g;
+}
+"""
+
+
+def test_functions_in_geometry_steps_read_the_scene(gl: rg.Session, tmp_path: Path) -> None:
+    (tmp_path / "dim.py").write_text(
+        "from rendergraph.api import Function, Input, Node, SceneData, ShadowLookup\n" + inspect.getsource(Dim)
+    )
+    (tmp_path / "dim.glsl").write_text(DIM)
+    (tmp_path / "scene.yaml").write_text("scene: 1\n" + BOXES.replace("emissive: [1, 1, 1]", "roughness: 1"))
+    for name, lookup in (("lit", ""), ("dim", "lookup: dim.lookup")):
+        (tmp_path / f"{name}.yaml").write_text(
+            f"rendergraph: 1\nsize: [32, 24]\nscene: scene.yaml\nnodes:\n  dim: {{type: dim}}\n"
+            f"  light: {{type: forward_lighting, params: {{ambient: 0}}, inputs: {{{lookup}}}}}\n"
+            "outputs: {image: light.radiance}\n"
+        )
+    lit, dim = (gl.render(rg.load(tmp_path / f"{name}.yaml", plugins=[tmp_path]))["image"] for name in ("lit", "dim"))
+    np.testing.assert_allclose(dim[..., :3], 0.5 * lit[..., :3], atol=1e-3)
+    assert lit[..., :3].max() > 0.1
+
+
+# Mistakes ------------------------------------------------------------------------------------------------------------
+
+NO_SCENE = "nodes: {a: {type: plain}}\noutputs: {image: a.color}\n"
+
+
+class Plain(Node):
+    """A texel without the scene."""
+
+    color = Output(DisplayColor, format="rgba8", size=(1, 1), doc="Texel.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("plain.frag")
+
+
+def test_an_include_about_the_scene_needs_the_scene(bench: Any) -> None:
+    pipeline = bench.pipeline(NO_SCENE, Plain, shaders={"plain.frag": PLACE}, scene=BOXES)
+    text = r"plain.frag:2:1: RG430 .* declare `scene = Input\(SceneData\)` and give the step scene=self.scene"
+    with pytest.raises(InputError, match=text):
+        pipeline.check()
+    with pytest.raises(InputError, match=text):
+        bench.session.render(pipeline)
+
+
+def test_nothing_is_linked_to_the_scene(bench: Any) -> None:
+    text = "nodes: {p: {type: plain}, a: {type: of, inputs: {scene: p.color}}}\noutputs: {image: a.color}\n"
+    shaders = {"plain.frag": WHITE, "of.frag": PLACE}
+    with pytest.raises(InputError, match=r"'a.scene' expects a scene, but 'p.color' .* leave it out"):
+        bench.pipeline(text, Of, Plain, shaders=shaders).check()
