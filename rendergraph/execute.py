@@ -245,7 +245,7 @@ class Runner(Struct, eq=False):
         views.set(CAMERA, (camera,))
         moved = False
         if self._scene is None or self._scene.placed.objects is not scene.objects:
-            self._scene, moved = FrameScene(scene, self._scene), True
+            self._scene, moved = FrameScene(scene, self._scene, self.executable.scene.decode), True
         self._scene.scene = scene
         updates: dict[str, float] = {}
         has_moved = partial(_has_moved, moved_from, self._seen)

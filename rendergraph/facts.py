@@ -24,12 +24,41 @@ Keyframes change neither.
 """
 
 
+class Extra(dict[str, Any]):
+    """Values that an entry of a scene file gives to keys of plugins, by name; read-only. `SceneKey.of` reads one."""
+
+    def __hash__(self) -> int:  # type: ignore[override]  # nobody writes to it
+        return hash(frozenset(self.items()))
+
+
+NO_EXTRA = Extra()
+
+
 class LightFacts(Struct, frozen=True):
-    """A light without the values that keyframes change; `casts_shadow` allows nodes to choose it for shadows."""
+    """A light without the values that keyframes change; `casts_shadow` allows nodes to choose it for shadows.
+
+    Attributes:
+        extra: values of plugins' keys, see `SceneKey.of`; keyframes may change them, as with the other facts.
+    """
 
     name: str
     type: Literal["directional", "point", "spot"]
     casts_shadow: bool = True
+    extra: Extra = NO_EXTRA
+
+
+class MaterialFacts(Struct, frozen=True):
+    """A material; `extra` has the values of plugins' keys."""
+
+    name: str
+    extra: Extra = NO_EXTRA
+
+
+class CameraFacts(Struct, frozen=True):
+    """The camera that the pipeline renders with; `extra` has the values of plugins' keys."""
+
+    name: str = ""
+    extra: Extra = NO_EXTRA
 
 
 def casting_lights(wanted: str | Sequence[str], lights: Sequence[Any]) -> tuple[int, ...]:
@@ -72,6 +101,7 @@ class ObjectFacts(Struct, frozen=True, eq=False):
         emissive: its material emits light in some frame.
         reflective: its material reflects other than 4 % at normal incidence where it is not metal, in some frame.
         mesh: the name of its mesh.
+        extra: values of plugins' keys, see `SceneKey.of`.
     """
 
     name: str
@@ -88,6 +118,7 @@ class ObjectFacts(Struct, frozen=True, eq=False):
     _gap: Callable[[], str] = str
     _plane: Callable[[], object] = lambda: None
     _convex: Callable[[], bool] = bool
+    extra: Extra = NO_EXTRA
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, ObjectFacts) and self._compared == other._compared
@@ -96,12 +127,13 @@ class ObjectFacts(Struct, frozen=True, eq=False):
         return hash(self._compared)
 
     def __repr__(self) -> str:
-        known = (f"{name}={getattr(self, name)!r}" for name in self.__struct_fields__ if name[0] != "_")
+        names = [name for name in self.__struct_fields__ if name[0] != "_" and (name != "extra" or self.extra)]
+        known = (f"{name}={getattr(self, name)!r}" for name in names)
         return f"ObjectFacts({', '.join(known)})"
 
     @property
     def _compared(self) -> tuple[object, ...]:
-        return astuple(self)[:-4]  # all but the mesh and what is asked of it
+        return *astuple(self)[:-5], self.extra  # all but the mesh and what is asked of it
 
     @property
     def closed(self) -> bool:
@@ -204,6 +236,8 @@ class Facts(Struct, frozen=True):
         inputs: what each connected input carries; a `many` input has one entry a link.
         environment: the environment map as it is uploaded; None if the scene has none.
         scene_data: what inputs of `SceneData` read; None if no node has one.
+        materials: of the scene, in the order of `FrameScene.materials`.
+        camera: the camera that renders.
     """
 
     viewport: tuple[int, int]
@@ -212,6 +246,8 @@ class Facts(Struct, frozen=True):
     objects: tuple[ObjectFacts, ...] = ()
     environment: TextureDesc | None = None
     scene_data: SceneDataFacts | None = None
+    materials: tuple[MaterialFacts, ...] = ()
+    camera: CameraFacts = CameraFacts()
 
     def of_scene(self, semantic: Semantic | Signature) -> tuple[TextureInfo, ...]:
         """What an unconnected input of this meaning reads of the scene; empty if the scene has nothing like it."""

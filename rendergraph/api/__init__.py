@@ -1,20 +1,24 @@
 """The one module a node author imports."""
 
 from rendergraph.declare import DROPPED as DROPPED
+from rendergraph.declare import CameraFacts as CameraFacts
 from rendergraph.declare import Extension as Extension
 from rendergraph.declare import Facts as Facts
 from rendergraph.declare import Function as Function
 from rendergraph.declare import History as History
+from rendergraph.declare import Image as Image
 from rendergraph.declare import InOut as InOut
 from rendergraph.declare import Input as Input
 from rendergraph.declare import Internal as Internal
 from rendergraph.declare import LightFacts as LightFacts
+from rendergraph.declare import MaterialFacts as MaterialFacts
 from rendergraph.declare import MeshData as MeshData
 from rendergraph.declare import Node as Node
 from rendergraph.declare import ObjectFacts as ObjectFacts
 from rendergraph.declare import Output as Output
 from rendergraph.declare import Part as Part
 from rendergraph.declare import Port as Port
+from rendergraph.declare import SceneKey as SceneKey
 from rendergraph.declare import TextureInfo as TextureInfo
 from rendergraph.declare import Views as Views
 from rendergraph.declare import casting_lights as casting_lights

@@ -65,7 +65,8 @@ def command(topic: str, glsl: bool, pipeline: str | None, step: int | None, sele
     elif re.fullmatch(r"[Rr][Gg]\d+", topic):
         _print(reference.error_page(topic.upper()), _error_text, as_json)
     elif topic in reference.FILE_KINDS:
-        _print({"file": topic, "keys": reference.file_keys(topic)}, _keys_text, as_json)
+        extensions = options.extensions(plugins) if topic == "scene" else None
+        _print({"file": topic, "keys": reference.file_keys(topic, extensions)}, _keys_text, as_json)
     else:
         _node_or_file(topic, plugins, select, glsl=glsl, step=step, as_json=as_json)
 

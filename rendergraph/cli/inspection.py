@@ -284,7 +284,8 @@ def schema(
     elif what in ("scene", "sweep"):
         from rendergraph.keys import as_markdown, file_schema
 
-        document = as_markdown(file_schema(reference.table_of(what)))
+        extensions = options.extensions(plugins) if what == "scene" else None
+        document = as_markdown(file_schema(reference.table_of(what, extensions)))
     else:
         document = _of_pipelines(what, plugins)
     options.put(json.dumps(document, indent=2, ensure_ascii=False), output, as_json=as_json)

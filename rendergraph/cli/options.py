@@ -19,6 +19,7 @@ from rendergraph.cli.output import emit, emit_json, warn
 from rendergraph.errors import InputError
 
 if TYPE_CHECKING:
+    from rendergraph.declare import Extensions
     from rendergraph.session import Pipeline, Selection
     from rendergraph.session.values import Linked
 
@@ -319,6 +320,15 @@ def link(selection: Selection) -> Linked:
     linked = stages.link(stages.resolve(selection))
     warn(linked.warnings)
     return linked
+
+
+def extensions(plugins: tuple[Path, ...]) -> Extensions:
+    """Return what plugins add beside node types; print what is wrong with it as warnings."""
+    from rendergraph.catalog import Catalog
+
+    found = Catalog.discover(plugins).extensions
+    warn(found.warnings)
+    return found
 
 
 def sketch(selection: Selection) -> Linked:

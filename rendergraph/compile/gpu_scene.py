@@ -23,13 +23,12 @@ from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import GpuTexture
 from rendergraph.program.variants import FIXED_BLOCKS, light_macros, scene_macros, storage_blocks
 from rendergraph.scene import pack
+from rendergraph.scene.animate import moving_plugin_keys
+from rendergraph.scene.facts import Decode
 from rendergraph.scene.model import ImageSource, MadeImage, Scene, Texture, changed_objects
 from rendergraph.scene.pack import PackedScene, Records
 from rendergraph.scene.scene_data import data_macros, instance_data, used_textures
 from rendergraph.textures import TextureDesc, full_mip_count
-
-Decode = Callable[[ImageSource, bool], npt.NDArray[Any]]
-"""Image to (height, width, 4) uint8 or float32, top row first; the flag says that colours are sRGB."""
 
 DecodeLight = Callable[[ImageSource | MadeImage], npt.NDArray[Any]]
 """The picture around a scene, likewise."""
@@ -56,6 +55,8 @@ SCENE_ATTRIBUTES = {
     **dict.fromkeys(PREVIOUS_ATTRIBUTES, "4f"),
 }
 """What a vertex shader that draws the scene may read, with moderngl's formats."""
+_SECTIONS = {"objects": "instances", "materials": "material_block", "lights": "light_block"}
+"""Sections of scene files with what changes where values of plugins' keys change."""
 _MOST_RUNS = 32  # of neighbouring records that are uploaded one by one; what lies between them goes along beyond
 _PADDING = {"4f": "16x", "2i": "8x"}
 
@@ -70,7 +71,8 @@ class GpuScene(Struct, eq=False, dict=True):
     """Buffers, material textures and the macros a scene gives to shaders.
 
     Attributes:
-        changes: how often each block, the `instances`, and those of the frame before have been uploaded anew.
+        changes: how often each block, the `instances`, and those of the frame before have been uploaded anew, or the
+            `camera` has changed.
     """
 
     device: Device
@@ -146,6 +148,11 @@ class GpuScene(Struct, eq=False, dict=True):
                 if self._data is not None:
                     self._data.instances = instance_data(scene, packed)
                     write_records(self._data.buffers["scene_instance_block"], self._data.instances, moved)
+        for section in moving_plugin_keys(scene) & _SECTIONS.keys():
+            pairs = zip(getattr(self.scene, section), getattr(scene, section), strict=True)
+            self.changes[_SECTIONS[section]] += any(before.extra != now.extra for before, now in pairs)
+        if scene.camera is not self.scene.camera:
+            self.changes["camera"] += 1
         self.scene, self.packed = scene, packed
 
     def advance(self) -> None:

@@ -20,6 +20,7 @@ SCENE_CHANGES = {
     "lights": "light_block",
     "materials": "material_block",
     "environment": "environment_block",
+    "camera": "camera",
 }
 """What of a scene can change, by the counters of `GpuScene.changes`."""
 
@@ -55,7 +56,8 @@ class UploadedValues(Struct, eq=False):
         values, (write,) = self.upload.values, self.step().writes
         if callable(values):
             desc = self.memory.plan.resources[write.resource].desc
-            values = texels(write.name, values(FrameScene(self.scene.scene)), desc, write.mip, write.layer)
+            scene = FrameScene(self.scene.scene, decode=self.scene.decode)
+            values = texels(write.name, values(scene), desc, write.mip, write.layer)
         self._array, self._made_of = values, self._sources
 
     def write(self, parity: int) -> None:

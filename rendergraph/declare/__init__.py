@@ -18,8 +18,13 @@ from rendergraph.declare.parameters import Parameter as Parameter
 from rendergraph.declare.parameters import define as define
 from rendergraph.declare.parameters import param as param
 from rendergraph.declare.parameters import structural as structural
+from rendergraph.declare.scene_keys import Image as Image
+from rendergraph.declare.scene_keys import SceneKey as SceneKey
+from rendergraph.declare.scene_keys import Section as Section
+from rendergraph.facts import CameraFacts as CameraFacts
 from rendergraph.facts import Facts as Facts
 from rendergraph.facts import LightFacts as LightFacts
+from rendergraph.facts import MaterialFacts as MaterialFacts
 from rendergraph.facts import ObjectFacts as ObjectFacts
 from rendergraph.facts import TextureInfo as TextureInfo
 from rendergraph.facts import casting_lights as casting_lights

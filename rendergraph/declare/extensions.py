@@ -1,4 +1,4 @@
-"""What plugins add beside node types: semantics, choices, readers of meshes and images, metrics."""
+"""What plugins add beside node types: semantics, choices, readers of meshes and images, metrics, keys of scenes."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeAlias, TypeVar, get_args
 
 from msgspec import Struct
 
 from rendergraph.declare.blame import describe_error, source_location
+from rendergraph.declare.scene_keys import SceneKey, Section
 from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
 from rendergraph.glsl import about
 from rendergraph.stamps import Stamps, replay_reads, track_reads
 from rendergraph.textures import SEMANTICS, Semantic
-from rendergraph.typecheck import Matching, mistakes_of
+from rendergraph.typecheck import Matching, mistakes_of, test_of, words_for
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -81,6 +82,7 @@ class Extension(Struct, frozen=True):
             the top row first, uint8 (sRGB where the slot is a colour) or floats (linear light).
         metrics: name to a function of two pictures, (height, width, 3) in float64, sRGB-encoded from 0 to 1 where they
             are display-referred and linear otherwise, the second the reference; the result grows with the error.
+        scene_keys: section of scene files (`objects`, `materials`, `lights`, `cameras`) to further keys of its entries.
     """
 
     semantics: tuple[Semantic, ...] = ()
@@ -88,6 +90,7 @@ class Extension(Struct, frozen=True):
     meshes: Mapping[Ending, MeshLoader] = {}
     images: Mapping[Ending, ImageLoader] = {}
     metrics: Mapping[Word, Metric] = {}
+    scene_keys: Mapping[Section, tuple[SceneKey, ...]] = {}
 
 
 READ_IMAGES = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga")
@@ -114,6 +117,15 @@ def extension_mistakes(extension: Extension, folder: Path) -> list[Problem]:
     for field, (taken, text) in _TAKEN.items():
         names = [name for name in getattr(extension, field) if name in taken]
         mistakes += [Problem("RG495", text.format(name), subject=field) for name in names]
+    for section, keys in extension.scene_keys.items():
+        named = [key.name for key in keys]
+        for key in keys:
+            wrong = "is listed twice" if named.count(key.name) > 1 else key.mistake()
+            if not test_of(Word)(key.name):
+                wrong = f"has a name that is not {words_for(Word)}"
+            if wrong:
+                text = f"scene_keys['{section}']: the key '{key.name}' {wrong}"
+                mistakes.append(Problem("RG495", text, subject="scene_keys"))
     return mistakes
 
 
@@ -237,12 +249,28 @@ class Extensions:
             _one("metric", metric.name, found)
         return found
 
+    def scene_keys(self, section: str) -> list[Added[SceneKey]]:
+        """Keys of the entries in a section of scene files."""
+        return [
+            Added(key.name, key, source.plugin, source.file)
+            for source, extension in self._usable()
+            for name, keys in extension.scene_keys.items()
+            for key in keys
+            if name == section
+        ]
+
+    def scene_key(self, section: str, name: str) -> Added[SceneKey] | None:
+        """A key by name; two plugins with one name are an error."""
+        return _one(f"key of {section}", name, self.scene_keys(section))
+
     def listed(self) -> list[dict[str, str]]:
         """Everything that plugins add, as plain values: `kind`, `name`, `plugin`, `doc`."""
         rows: list[tuple[str, Added[Any]]] = [("semantic", added) for added in self.semantics()]
         rows += self._choices()
         for field, kind in (("meshes", "mesh loader"), ("images", "image loader"), ("metrics", "metric")):
             rows += [(kind, added) for added in self._added(field)]
+        for section in get_args(Section):
+            rows += [(f"key of {section}", added) for added in self.scene_keys(section)]
         return [
             {"kind": kind, "name": added.name, "plugin": added.plugin, "doc": _doc(added.value)} for kind, added in rows
         ]
@@ -279,7 +307,7 @@ def _doc(value: object) -> str:
     """The first line of the documentation of what a plugin adds."""
     if isinstance(value, Path):
         return about(value)
-    doc = value.doc if isinstance(value, Semantic) else inspect.getdoc(value) or ""
+    doc = value.doc if isinstance(value, Semantic | SceneKey) else inspect.getdoc(value) or ""
     return doc.partition("\n")[0]
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from msgspec import Struct
 
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.declare import Facts, LightFacts, TextureInfo
+from rendergraph.declare import CameraFacts, Facts, LightFacts, MaterialFacts, TextureInfo
 from rendergraph.document import Value
 from rendergraph.errors import InputError, Option, Problem, suggestion
 from rendergraph.facts import ObjectFacts, SceneDataFacts
@@ -39,6 +39,8 @@ def link(
     objects: Sequence[ObjectFacts] | None = None,
     environment: TextureDesc | None = None,
     scene_data: Callable[[], SceneDataFacts] = SceneDataFacts,
+    materials: Sequence[MaterialFacts] = (),
+    camera: CameraFacts = CameraFacts(),
 ) -> Graph:
     """Return the checked graph, or raise with all mistakes, those in `spec.problems` included.
 
@@ -48,7 +50,8 @@ def link(
         scene_data: called if some node reads the scene's data.
     """
     given = None if objects is None else tuple(objects)
-    return _Linker(spec, spec.catalog or catalog, tuple(lights), given, environment, scene_data).graph()
+    scene = environment, scene_data, tuple(materials), camera
+    return _Linker(spec, spec.catalog or catalog, tuple(lights), given, *scene).graph()
 
 
 def sketch(
@@ -132,6 +135,8 @@ class _Linker(Struct, eq=False):
     objects: tuple[ObjectFacts, ...] | None
     environment: TextureDesc | None
     scene_data: Callable[[], SceneDataFacts] = SceneDataFacts
+    materials: tuple[MaterialFacts, ...] = ()
+    camera: CameraFacts = CameraFacts()
     sketching: bool = False
     missing: list[Problem] = []
     problems: list[Problem] = []
@@ -167,6 +172,8 @@ class _Linker(Struct, eq=False):
             objects=self.objects or (),
             environment=self.environment,
             scene_data=self.scene_data() if reads_scene else None,
+            materials=self.materials,
+            camera=self.camera,
         )
         infer = TextureInference(nodes, facts, used)
         textures: dict[Endpoint, TextureInfo] = {}
@@ -204,6 +211,8 @@ class _Linker(Struct, eq=False):
             disabled=tuple(name for name, draft in written.items() if draft.spec.disabled is not None),
             environment=self.environment,
             scene_data=facts.scene_data,
+            materials=self.materials,
+            camera=self.camera,
             unlit=tuple(name for name, draft in written.items() if draft.unlit),
             overwritten=overwritten,
             cyclic=_links(nodes) if len(order) < len(nodes) else {},

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from msgspec import Struct, field
 
 from rendergraph.catalog import NodeType
-from rendergraph.declare import Facts, LightFacts, Node, Texel, TextureInfo
+from rendergraph.declare import CameraFacts, Facts, LightFacts, MaterialFacts, Node, Texel, TextureInfo
 from rendergraph.document import Value
 from rendergraph.errors import Place, Problem
 from rendergraph.facts import SELECTIONS, ObjectFacts, SceneDataFacts
@@ -84,6 +84,8 @@ class Graph(Struct, frozen=True, dict=True):
     objects: tuple[ObjectFacts, ...] | None = None
     environment: TextureDesc | None = None
     scene_data: SceneDataFacts | None = None
+    materials: tuple[MaterialFacts, ...] = ()
+    camera: CameraFacts = CameraFacts()
     unlit: tuple[str, ...] = ()
     overwritten: Mapping[tuple[str, str], Problem] = field(default_factory=dict)
     cyclic: Mapping[tuple[str, str, Endpoint], Value] = field(default_factory=dict)
@@ -116,6 +118,8 @@ class Graph(Struct, frozen=True, dict=True):
             objects=self.objects or (),
             environment=self.environment,
             scene_data=self.scene_data,
+            materials=self.materials,
+            camera=self.camera,
         )
 
     @cached_property

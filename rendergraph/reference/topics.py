@@ -8,6 +8,7 @@ from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.resources import folder
 
 if TYPE_CHECKING:
+    from rendergraph.declare import Extensions
     from rendergraph.keys import Table
 
 FILE_KINDS = {
@@ -19,12 +20,15 @@ FILE_KINDS = {
 }
 
 
-def table_of(kind: str) -> Table:
-    """Return the keys of a kind of file. Each is imported only when it is asked for."""
+def table_of(kind: str, extensions: Extensions | None = None) -> Table:
+    """Return the keys of a kind of file, with those of plugins. Each is imported only when it is asked for."""
     if kind == "pipeline":
         from rendergraph.read import PIPELINE as table  # see above
     elif kind == "scene":
-        from rendergraph.scene.scene_keys import SCENE as table  # see above
+        from rendergraph.declare import NO_EXTENSIONS  # see above
+        from rendergraph.scene.scene_keys import scene_table, with_plugins  # see above
+
+        table = scene_table(with_plugins(extensions or NO_EXTENSIONS))
     elif kind == "sweep":
         from rendergraph.compare.sweepfile import SWEEP as table  # see above
     elif kind == "settings":
@@ -34,7 +38,7 @@ def table_of(kind: str) -> Table:
     return table
 
 
-def file_keys(kind: str) -> list[dict[str, Any]]:
+def file_keys(kind: str, extensions: Extensions | None = None) -> list[dict[str, Any]]:
     from rendergraph.keys import brief  # most topics need no keys
 
     return [
@@ -47,7 +51,7 @@ def file_keys(kind: str) -> list[dict[str, Any]]:
             "required": key.required,
             "doc": key.doc,
         }
-        for section, keys in table_of(kind).sections()
+        for section, keys in table_of(kind, extensions).sections()
         for key in keys
     ]
 

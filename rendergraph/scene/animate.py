@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
 
 from rendergraph.errors import InputError, Option, Place, Problem, suggestion
+from rendergraph.facts import NO_EXTRA, Extra
 from rendergraph.scene import scene_values
 from rendergraph.scene.cameras import WIDE, bounding_sphere, framing_camera
 from rendergraph.scene.geometry import rigid, translation
@@ -39,6 +41,12 @@ def moves(scene: Scene) -> bool:
     return bool(scene.keyframes) or scene.orbit is not None
 
 
+def moving_plugin_keys(scene: Scene) -> set[str]:
+    """Return the sections of which keyframes change plugins' keys."""
+    paths = [(path.partition(".")[0], path.rpartition(".")[2]) for path in scene.keyframes if scene.plugin_keys]
+    return {section for section, key in paths if key in scene.plugin_keys.get(section, ())}
+
+
 def at(scene: Scene, time_s: float) -> Scene:
     """The scene at a time in seconds: keyframes first, then the orbit. Meshes are shared, never copied."""
     if not moves(scene):
@@ -50,7 +58,14 @@ def at(scene: Scene, time_s: float) -> Scene:
         name, key = ("", rest) if section == "environment" else rest.rpartition(".")[::2]
         changed.setdefault((section, name), {})[key] = interpolated(frames, time_s)
     for (section, name), values in changed.items():
-        scene = _changed(scene, section, name, {**scene.recipe.get((section, name), {}), **values})
+        recipe = scene.recipe.get((section, name), {})
+        added = {key: values.pop(key) for key in scene.plugin_keys.get(section, frozenset()) & values.keys()}
+        if added and section == "objects":  # a part of a file may have other values than the whole
+            scene = _with_extra(scene, name, added)
+        elif added:
+            values["extra"] = Extra({**recipe.get("extra", NO_EXTRA), **added})
+        if values:
+            scene = _changed(scene, section, name, {**recipe, **values})
     return scene if scene.orbit is None else _orbited(scene, time_s, first if first.objects is scene.objects else scene)
 
 
@@ -106,6 +121,15 @@ def _changed(scene: Scene, section: str, name: str, values: Mapping[str, Any]) -
         if entry.name == name:
             materials[number] = scene_values.material(name, values, entry.textures)
     return replace(scene, materials=tuple(materials))
+
+
+def _with_extra(scene: Scene, name: str, added: Mapping[str, Any]) -> Scene:
+    """The scene with other values of plugins' keys in every part of an object."""
+    copies, objects = scene.copies.get(("objects", name)), list(scene.objects)
+    names = [name] if copies is None else [f"{name}.{number}" for number in range(len(copies.offsets))]
+    for index, _ in chain.from_iterable(scene.placements.get(name, Placement()).objects for name in names):
+        objects[index] = replace(objects[index], extra=Extra({**objects[index].extra, **added}))
+    return replace(scene, objects=tuple(objects))
 
 
 def _placed_again(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property, partial
 from operator import attrgetter
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.declare import LightFacts
+from rendergraph.declare import CameraFacts, LightFacts, MaterialFacts
 from rendergraph.facts import SELECTIONS, ObjectFacts
-from rendergraph.scene.model import Light, Material, Mesh, Object, Scene, Vec3, changed_objects
+from rendergraph.scene.model import Camera, ImageSource, Light, Material, Mesh, Object, Scene, Vec3, changed_objects
 from rendergraph.textures import TextureDesc, full_mip_count
 
 Corners: TypeAlias = npt.NDArray[np.float64]
+Decode: TypeAlias = Callable[[ImageSource, bool], npt.NDArray[Any]]
+"""Image to (height, width, 4) uint8 or floats, top row first; the flag says that colours are sRGB."""
 
 
 def selected(scene: Scene, name: str) -> list[int]:
@@ -46,13 +49,23 @@ def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
                 partial(attrgetter("edges.gap"), mesh),
                 partial(attrgetter("plane"), mesh),
                 partial(attrgetter("convex"), mesh),
+                placed.extra,
             )
         )
     return tuple(facts)
 
 
 def light_facts(scene: Scene) -> tuple[LightFacts, ...]:
-    return tuple(LightFacts(light.name, light.type, light.casts_shadow) for light in scene.lights)
+    return tuple(LightFacts(light.name, light.type, light.casts_shadow, light.extra) for light in scene.lights)
+
+
+def material_facts(scene: Scene) -> tuple[MaterialFacts, ...]:
+    return tuple(MaterialFacts(material.name, material.extra) for material in scene.materials)
+
+
+def camera_facts(scene: Scene) -> CameraFacts:
+    """Of the first camera, which is the one that renders."""
+    return CameraFacts(scene.camera.name, scene.camera.extra) if scene.camera is not None else CameraFacts()
 
 
 def environment_facts(scene: Scene) -> TextureDesc | None:
@@ -71,9 +84,10 @@ class FrameScene:
         placed: of the frame in which the objects came to where they are.
     """
 
-    def __init__(self, scene: Scene, before: FrameScene | None = None) -> None:
-        """Share with the scene of the frames until now what has not changed."""
+    def __init__(self, scene: Scene, before: FrameScene | None = None, decode: Decode | None = None) -> None:
+        """Share with the scene of the frames until now what has not changed; `decode` is for `pixels`."""
         self.scene = self.placed = scene
+        self._decode = decode
         if before is None or "corners" not in vars(before) or before.placed.meshes is not scene.meshes:
             return
         moved = changed_objects(before.placed, scene)
@@ -98,6 +112,16 @@ class FrameScene:
     @property
     def meshes(self) -> tuple[Mesh, ...]:
         return self.scene.meshes
+
+    @property
+    def camera(self) -> Camera:
+        assert self.scene.camera is not None  # a scene that is drawn has been completed
+        return self.scene.camera
+
+    def pixels(self, image: ImageSource) -> npt.NDArray[np.float32]:
+        assert self._decode is not None, "only a scene that is drawn has pixels"
+        found = self._decode(image, False)
+        return found.astype(np.float32) / np.float32(255 if found.dtype == np.uint8 else 1)
 
     @cached_property
     def corners(self) -> Corners:

@@ -22,6 +22,7 @@ from msgspec.structs import replace
 from rendergraph.declare import Added
 from rendergraph.declare.extensions import ImageLoader
 from rendergraph.document import YamlLimits
+from rendergraph.facts import NO_EXTRA, Extra
 from rendergraph.scene.edges import Edges, find_edges, is_solid
 from rendergraph.stamps import Stamps
 
@@ -207,6 +208,7 @@ class Material(Struct, frozen=True):
             `specular`, `specular_color`.
         ambient, diffuse, specular_phong, shininess: an OBJ's Ka, Kd, Ks, Ns where the MTL gives no Pr/Pm; None where
             the material is metallic-roughness (design.md §8 says how one is derived from the other).
+        extra: values of plugins' keys, also of objects, lights and cameras.
     """
 
     name: str
@@ -230,6 +232,7 @@ class Material(Struct, frozen=True):
     diffuse: Vec3 | None = None
     specular_phong: Vec3 | None = None
     shininess: float | None = None
+    extra: Extra = NO_EXTRA
 
 
 class Object(Struct, frozen=True, eq=False):
@@ -250,6 +253,7 @@ class Object(Struct, frozen=True, eq=False):
     casts_shadow: bool = True
     hidden: bool = False
     node: str = ""
+    extra: Extra = NO_EXTRA
 
 
 class Light(Struct, frozen=True):
@@ -275,6 +279,7 @@ class Light(Struct, frozen=True):
     inner: float = 0.0
     outer: float = 0.7853981633974483
     casts_shadow: bool = True
+    extra: Extra = NO_EXTRA
 
 
 class Camera(Struct, frozen=True, eq=False):
@@ -299,6 +304,7 @@ class Camera(Struct, frozen=True, eq=False):
     near: float = 0.05
     far: float = 100.0
     target: Vec3 | None = None
+    extra: Extra = NO_EXTRA
 
 
 class Environment(Struct, frozen=True):
@@ -353,6 +359,7 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         recipe: section and name (`("cameras", "main")`) to the values in the scene file, which keyframes change.
         placements: name of a scene file's object, or of one copy of it, to its parts.
         copies: section and name of a scene file's entry to its `repeat.Copies`.
+        plugin_keys: section to the names of the plugins' keys that its file may use.
         files: every file accessed while reading it, as it was.
     """
 
@@ -370,6 +377,7 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
     recipe: Mapping[tuple[str, str], Mapping[str, Any]] = field(default_factory=dict)
     placements: Mapping[str, Placement] = field(default_factory=dict)
     copies: Mapping[tuple[str, str], Any] = field(default_factory=dict)
+    plugin_keys: Mapping[str, frozenset[str]] = field(default_factory=dict)
     files: Stamps = field(default_factory=dict)
 
     @cached_property
@@ -387,6 +395,11 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         low, high = extremes(np.concatenate([center - extent, center + extent]))
         (x, y, z), (u, v, w) = low.tolist(), high.tolist()
         return (x, y, z), (u, v, w)
+
+    @property
+    def camera(self) -> Camera | None:
+        """The first camera, which renders; a completed scene has one."""
+        return next(iter(self.cameras.values()), None)
 
     def has_grain(self, material: Material) -> bool:
         """Whether a material is anisotropic at any time."""

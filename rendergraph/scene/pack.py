@@ -175,7 +175,8 @@ def _moved(packed: PackedScene, before: Scene, scene: Scene) -> dict[str, Any]:
     """What objects are packed to of which some have moved: their records are made anew, those of the others copied."""
     was, now = before.objects, scene.objects
     moved = changed_objects(before, scene)
-    if any(asdict(was[number]) | {"transform": 0} != asdict(now[number]) | {"transform": 0} for number in moved):
+    free = {"transform": 0, "extra": 0}
+    if any(asdict(was[number]) | free != asdict(now[number]) | free for number in moved):
         return _placed(scene, packed.meshes)
     made = _placed(replace(scene, objects=tuple(now[number] for number in moved)), packed.meshes)
     made["instances"]["ids"][:, 1] = moved

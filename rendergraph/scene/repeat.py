@@ -75,7 +75,7 @@ class Copies(Struct, frozen=True, eq=False):
         if "intensity" in self.factors:
             intensities = (np.array(intensities) * self.factors["intensity"][:, 0]).tolist()
         ranges = self.values.get("range", n * [light.range])
-        rest = light.inner, light.outer, light.casts_shadow
+        rest = light.inner, light.outer, light.casts_shadow, light.extra
         rows = zip(positions, directions, colors, intensities, ranges, strict=True)
         return [Light(f"{light.name}.{number}", light.type, *row, *rest) for number, row in enumerate(rows)]
 

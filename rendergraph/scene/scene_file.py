@@ -10,15 +10,18 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
+from rendergraph.declare import Section
 from rendergraph.document import Value, load, shown
 from rendergraph.errors import InputError, Problem, suggestion
-from rendergraph.keys import Key, Validator, plain
+from rendergraph.facts import NO_EXTRA, Extra
+from rendergraph.keys import Key, MapOf, Validator, plain
+from rendergraph.keys.values import FILE
 from rendergraph.scene import scene_keys, scene_values
 from rendergraph.scene.environments import SKIES, named
 from rendergraph.scene.geometry import rigid
@@ -84,13 +87,16 @@ class _Reader:
         self.files: dict[Path, _File] = {}
         self.material_numbers: dict[str | None, int] = {}
         self.names: dict[str, tuple[str, ...]] = {}
+        self.table, self.sections = scene_keys.SCENE, scene_keys.SECTIONS
+        self.plugin_keys: dict[str, frozenset[str]] = {}
         self.vertices = 0
 
     def read(self, root: Value) -> Scene:
         """The scene; only to be used if no problem was found."""
         sections = ("objects", "materials", "lights", "cameras")
         self.names = names = {section: tuple(_entries(root, section)) for section in sections}
-        top = self.validator.file(root, scene_keys.SCENE, "`scene: 1` and `objects`")
+        self._add_plugin_keys(root)
+        top = self.validator.file(root, self.table, "`scene: 1` and `objects`")
         if top is None:
             return Scene(self.path.stem)
         for section, read in (("materials", self._material), ("lights", self._light), ("cameras", self._camera)):
@@ -113,7 +119,41 @@ class _Reader:
             recipe=self.recipe,
             placements=self.placements,
             copies=self.copies,
+            plugin_keys=self.plugin_keys,
         )
+
+    def _add_plugin_keys(self, root: Value) -> None:
+        """Ask the plugins if the file has keys that are not rendergraph's own."""
+        asked = _unknown_keys(root)
+        if not any(asked.values()):
+            return
+        self.sections = scene_keys.with_plugins(self.reading.extensions, asked)
+        self.table = scene_keys.scene_table(self.sections)
+        own = scene_keys.SECTIONS
+        for section, table in self.sections.items():
+            self.plugin_keys[section] = frozenset(key.name for key in table.keys[len(own[section].keys) :])
+        known = self.plugin_keys
+        if any(not names <= known[section] for section, names in asked.items()):
+            self.validator.problems += self.reading.extensions.problems
+
+    def _plain(self, section: str, entry: Value) -> dict[str, Any]:
+        """The values of an entry; those of plugins' keys are in its `extra`, images among them opened."""
+        return self._split(section, entry, plain(entry, self.sections[section]))
+
+    def _split(self, section: str, entry: Value, values: dict[str, Any]) -> dict[str, Any]:
+        added = {key: values.pop(key) for key in self.plugin_keys.get(section, frozenset()) & values.keys()}
+        if added:
+            values["extra"] = Extra(self._opened(section, entry, added))
+        return values
+
+    def _opened(self, section: str, entry: Value, added: dict[str, Any]) -> dict[str, Any]:
+        for key in self.sections[section].keys:
+            if key.name in added and key.type is FILE:
+                place, file = _value(entry, key.name), added.pop(key.name)
+                with self._reading_file(place):
+                    image = self.reading.image(self.reading.resolve(file, line=place.line), "image", line=place.line)
+                    added[key.name] = image
+        return added
 
     def _check_name(self, entry: Value, key: str, known: Iterable[str], section: str) -> None:
         value = entry.get(key)
@@ -139,7 +179,7 @@ class _Reader:
         return self.reading.over(what, limit).relocated(entry.relocate)
 
     def _material(self, name: str, entry: Value) -> None:
-        values = plain(entry, scene_keys.MATERIAL)
+        values = self._plain("materials", entry)
         textures = {}
         for key, _ in scene_keys.TEXTURES:
             if key in values:
@@ -153,7 +193,7 @@ class _Reader:
         self.materials.append(scene_values.material(name, values, textures))
 
     def _light(self, name: str, entry: Value) -> None:
-        self.recipe["lights", name] = values = plain(entry, scene_keys.LIGHT)
+        self.recipe["lights", name] = values = self._plain("lights", entry)
         if "type" in values:
             try:
                 light = scene_values.light(name, values)
@@ -199,7 +239,7 @@ class _Reader:
             raise InputError(place.problem("RG321", f"'{shown(file)}' {problem}")) from None
 
     def _camera(self, name: str, entry: Value) -> None:
-        self.recipe["cameras", name] = values = plain(entry, scene_keys.CAMERA)
+        self.recipe["cameras", name] = values = self._plain("cameras", entry)
         try:
             self.cameras[name] = scene_values.camera(name, values)
         except ValueError as problem:
@@ -251,11 +291,11 @@ class _Reader:
 
     def _object(self, name: str, entry: Value, materials: Sequence[str]) -> None:
         self._check_name(entry, "material", materials, "materials")
-        values = plain(entry, scene_keys.OBJECT)
+        values = self._plain("objects", entry)
         for choice in _listed(entry.get("repeat", "choose", "material")):
             self._check_text(choice, "material", materials, "materials")
         copied = self._copies("objects", name, entry, values)
-        keys = [key.name for key in scene_keys.OBJECT.keys]
+        keys = ["extra", *(key.name for key in scene_keys.OBJECT.keys)]
         self.recipe["objects", name] = {key: values[key] for key in keys if key in values}
         world = scene_values.placed(values)
         placed = [(name, world)] if copied is None else copied.placed(name, world)
@@ -312,7 +352,8 @@ class _Reader:
                         self.materials.append(replace(self.materials[base], name=name + part.suffix, **more))
                     material = made[base, part.suffix]
                 transform = world @ part.local
-                self.objects.append(Object(copy + part.suffix, mesh, material, transform, casts_shadow, hidden, copy))
+                rest = casts_shadow, hidden, copy, values.get("extra", NO_EXTRA)
+                self.objects.append(Object(copy + part.suffix, mesh, material, transform, *rest))
             self.placements[copy] = Placement(tuple((first + k, part.local) for k, part in enumerate(parts)))
 
     def _file(
@@ -333,6 +374,7 @@ class _Reader:
                     changes.get("casts_shadow", part.casts_shadow),
                     changes.get("hidden", part.hidden),
                     f"{name}/{part.node}",
+                    Extra({**values.get("extra", NO_EXTRA), **changes["extra"]}) if "extra" in changes else NO_EXTRA,
                 )
             )
         for light in scene.lights:
@@ -369,7 +411,12 @@ class _Reader:
                 text = f"object '{shown(name)}': its file has no node '{shown(node)}'{suggestion(node, known)}"
                 self.validator.report(entry, "RG322", text, key=True)
             self._check_name(entry, "material", materials, "materials")
-        return {node: plain(entry, scene_keys.OVERRIDE) for node, entry in entries.items()}
+        override = self.sections["objects"].alternatives["file"]
+        assert isinstance(override, tuple)
+        assert isinstance(override[0].type, MapOf)
+        return {
+            node: self._split("objects", entry, plain(entry, override[0].type.of)) for node, entry in entries.items()
+        }
 
     def _keyframes(self, top: Value, names: dict[str, tuple[str, ...]]) -> dict[str, tuple[tuple[float, Any], ...]]:
         result = {}
@@ -401,18 +448,35 @@ class _Reader:
         name, key = ("", rest) if section == "environment" else rest.rpartition(".")[::2]
         known = names.get(section, ())
         moving: dict[str, Key] = {}
-        if section not in scene_keys.ANIMATED:
-            hint = suggestion(section, scene_keys.ANIMATED)
+        if section not in scene_keys.SECTIONS:
+            hint = suggestion(section, scene_keys.SECTIONS)
             text = f"keyframes: there is no section '{shown(section)}'{hint}"
         elif section != "environment" and name not in known:
             hint = suggestion(name, known) or f"; there are no {section}"
             text = f"keyframes: there is no '{shown(name)}' under {section}{hint}"
         else:
-            moving = scene_keys.moving(section)
+            moving = scene_keys.moving(self.sections[section])
             text = f"keyframes: {section} have no moving key '{shown(key)}'{suggestion(key, moving)}"
         if key not in moving:
             self.validator.report(entry, "RG322", text, key=True)
         return moving.get(key)
+
+
+def _unknown_keys(root: Value) -> dict[str, set[str]]:
+    """By section the keys of entries, of overrides and of keyframes that rendergraph itself does not know."""
+    found: dict[str, set[str]] = {}
+    own = {key.name for key in scene_keys.OVERRIDE.keys}
+    for section in get_args(Section):
+        names = found[section] = set()
+        for entry in _entries(root, section).values():
+            names |= entry.mapping.keys() - scene_keys.SECTIONS[section].keys_of(entry).keys()
+            for override in _entries(entry, "overrides").values() if section == "objects" else ():
+                names |= override.mapping.keys() - own
+    for path in _entries(root, "keyframes"):
+        section, key = str(path).partition(".")[0], str(path).rpartition(".")[2]
+        if section in found and key not in scene_keys.NAMES[section]:
+            found[section].add(key)
+    return found
 
 
 def _entries(value: Value, section: str) -> dict[str, Value]:

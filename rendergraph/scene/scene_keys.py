@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, get_args
 
+from msgspec.structs import replace
+
+from rendergraph.declare import Extensions, Section
+from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.keys import Codes, Key, MapOf, Table, schema
 from rendergraph.keys.values import FILE, TEXT, choice, color, listed, number, row, scale, vector, version, whole, word
 from rendergraph.scene.shapes import LENGTH, SHAPES
@@ -70,6 +75,7 @@ _OVERRIDABLE = (
     Key("hidden", bool, "Not drawn at all.", False),
 )
 OVERRIDE = Table("override '{}'", _OVERRIDABLE)
+_OVERRIDES = Key("overrides", MapOf(OVERRIDE), "For a file: node name to material, hidden, casts_shadow.")
 OBJECT = Table(
     "object '{}'",
     (
@@ -90,7 +96,7 @@ OBJECT = Table(
     ),
     {
         "shape": {name: shape.keys for name, shape in SHAPES.items()},
-        "file": (Key("overrides", MapOf(OVERRIDE), "For a file: node name to material, hidden, casts_shadow."),),
+        "file": (_OVERRIDES,),
     },
 )
 
@@ -214,47 +220,86 @@ ORBIT = Table(
 )
 
 
-ANIMATED = {"objects": OBJECT, "materials": MATERIAL, "lights": LIGHT, "cameras": CAMERA, "environment": ENVIRONMENT}
-"""Sections whose numbers, vectors and colours keyframes may change."""
+SECTIONS = {"objects": OBJECT, "materials": MATERIAL, "lights": LIGHT, "cameras": CAMERA, "environment": ENVIRONMENT}
+"""The tables of the sections' entries, whose numbers, vectors and colours keyframes may change."""
+_SHAPE_KEYS = {key.name for shape in SHAPES.values() for key in shape.keys}
+NAMES = {section: {key.name for key in table.keys} for section, table in SECTIONS.items()}
+"""The names of each section's own keys, without those of shapes and of plugins."""
 
 
-def moving(section: str) -> dict[str, Key]:
-    """The keys of a section that keyframes may change."""
-    return {key.name: key for key in ANIMATED[section].keys if is_numeric(key.type)}
+def moving(table: Table) -> dict[str, Key]:
+    """The keys of a section's table that keyframes may change."""
+    return {key.name: key for key in table.keys if is_numeric(key.type)}
 
 
-def _keyframes() -> Schema:
+def with_plugins(extensions: Extensions, asked: Mapping[str, Iterable[str]] = {}) -> dict[str, Table]:
+    """Return `SECTIONS` with the keys that plugins add.
+
+    Args:
+        asked: the names that somebody uses, by section; two plugins with one of them are an error.
+
+    Raises:
+        InputError: a plugin's key has the name of one of rendergraph's own (RG495), or of another plugin's (RG496).
+    """
+    found = dict(SECTIONS)
+    for section in get_args(Section):
+        added = {one.name: one for one in extensions.scene_keys(section)}
+        for name in asked.get(section, ()):
+            extensions.scene_key(section, name)
+        taken = NAMES[section] | (_SHAPE_KEYS | {"overrides"} if section == "objects" else set())
+        if wrong := next((one for one in added.values() if one.name in taken), None):
+            text = f"plugin '{wrong.plugin}': scene_keys['{section}'] has '{wrong.name}', a key of rendergraph's own"
+            raise InputError(Problem("RG495", text, Place(shown_file(wrong.file))))
+        keys = tuple(replace(one.value.key, doc=f"{one.value.doc} (plugin '{one.plugin}')") for one in added.values())
+        found[section] = replace(found[section], keys=(*found[section].keys, *keys))
+        if keys and section == "objects":
+            overrides = replace(_OVERRIDES, type=MapOf(replace(OVERRIDE, keys=(*OVERRIDE.keys, *keys))))
+            found[section] = replace(found[section], alternatives={**OBJECT.alternatives, "file": (overrides,)})
+    return found
+
+
+def _keyframes(sections: Mapping[str, Table]) -> Schema:
     found = {}
-    for section in ANIMATED:
+    for section, table in sections.items():
         name = "" if section == "environment" else r"\..+"
-        for key in moving(section).values():
+        for key in moving(table).values():
             frames = {"type": "object", "minProperties": 1, "additionalProperties": schema(key.type)}
             found[rf"^{section}{name}\.{key.name}$"] = {**frames, "description": key.doc}
     return {"type": "object", "patternProperties": found, "additionalProperties": False}
 
 
-_KEYFRAMES: Any = Annotated[dict[Any, Any], "a mapping of paths", Brief("mapping"), JsonSchema(_keyframes)]
-SCENE = Table(
-    "a scene file",
-    (
-        Key("scene", version(1), "Version of the format.", required=True, example="scene: 1"),
-        Key("description", TEXT, "What the scene shows."),
-        Key("objects", MapOf(OBJECT), "Shapes and files, by name."),
-        Key("materials", MapOf(MATERIAL), "Surfaces, by name."),
-        Key(
-            "lights",
-            MapOf(LIGHT),
-            "Lights, by name; without any, and without an environment, a directional key of 3 lux comes over the "
-            "viewer's left shoulder, and `studio` is around.",
+def scene_table(sections: Mapping[str, Table] = SECTIONS) -> Table:
+    """Return the table of a scene file whose sections have these tables."""
+    schema_of_keyframes = JsonSchema(lambda: _keyframes(sections))
+    keyframes: Any = Annotated[dict[Any, Any], "a mapping of paths", Brief("mapping"), schema_of_keyframes]
+    return Table(
+        "a scene file",
+        (
+            Key("scene", version(1), "Version of the format.", required=True, example="scene: 1"),
+            Key("description", TEXT, "What the scene shows."),
+            Key("objects", MapOf(sections["objects"]), "Shapes and files, by name."),
+            Key("materials", MapOf(sections["materials"]), "Surfaces, by name."),
+            Key(
+                "lights",
+                MapOf(sections["lights"]),
+                "Lights, by name; without any, and without an environment, a directional key of 3 lux comes over the "
+                "viewer's left shoulder, and `studio` is around.",
+            ),
+            Key(
+                "cameras",
+                MapOf(sections["cameras"]),
+                "Cameras, by name, the first is the default; without any the scene is framed.",
+            ),
+            Key("environment", ENVIRONMENT, "What is around the scene and lights it."),
+            Key(
+                "keyframes",
+                keyframes,
+                "Dotted path (`cameras.main.eye`) to seconds and values, linear between, held outside.",
+            ),
+            Key("orbit", ORBIT, "A camera that turns about its target."),
         ),
-        Key("cameras", MapOf(CAMERA), "Cameras, by name, the first is the default; without any the scene is framed."),
-        Key("environment", ENVIRONMENT, "What is around the scene and lights it."),
-        Key(
-            "keyframes",
-            _KEYFRAMES,
-            "Dotted path (`cameras.main.eye`) to seconds and values, linear between, held outside.",
-        ),
-        Key("orbit", ORBIT, "A camera that turns about its target."),
-    ),
-)
+    )
+
+
+SCENE = scene_table()
 CODES = Codes(unknown="RG320", wrong="RG321", name="RG321", file="RG321")

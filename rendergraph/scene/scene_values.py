@@ -8,11 +8,13 @@ from typing import Any, Literal
 
 from msgspec.structs import replace
 
+from rendergraph.facts import NO_EXTRA
 from rendergraph.projection import look_at, unit
 from rendergraph.scene.geometry import euler_matrix, placement, vec3
 from rendergraph.scene.model import Camera, Light, Material, Matrix, Texture
 
 _PLAIN = frozenset(Material.__struct_fields__) - {"name", "emissive", "textures"}
+"""Fields of a material that are values as a scene file has them; `extra` holds those of plugins' keys."""
 
 
 def material(name: str, values: Mapping[str, Any], textures: Mapping[str, Texture]) -> Material:
@@ -43,6 +45,7 @@ def light(name: str, values: Mapping[str, Any]) -> Light:
         math.radians(inner),
         math.radians(outer),
         values.get("casts_shadow", True),
+        values.get("extra", NO_EXTRA),
     )
 
 
@@ -75,6 +78,7 @@ def camera(name: str, values: Mapping[str, Any]) -> Camera:
         near,
         far,
         target,
+        values.get("extra", NO_EXTRA),
     )
 
 

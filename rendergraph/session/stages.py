@@ -27,7 +27,7 @@ from rendergraph.catalog import Catalog
 from rendergraph.document import Document, YamlLimits
 from rendergraph.errors import InputError, Option, Place, Problem, RendergraphError
 from rendergraph.scene.animate import complete
-from rendergraph.scene.facts import environment_facts, light_facts, object_facts
+from rendergraph.scene.facts import camera_facts, environment_facts, light_facts, material_facts, object_facts
 from rendergraph.scene.model import Scene
 from rendergraph.scene.scene_data import scene_data_facts
 from rendergraph.session.outputs import every_port, requested_outputs
@@ -110,6 +110,8 @@ def link(resolved: Resolved) -> Linked:
         object_facts(scene),
         environment_facts(scene),
         partial(scene_data_facts, scene),
+        material_facts(scene),
+        camera_facts(scene),
     )
     return Linked(**asdict(resolved), scene=scene, graph=graph)
 

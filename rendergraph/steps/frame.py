@@ -45,7 +45,7 @@ class ViewMatrices:
 
 
 class FrameScene(Protocol):
-    """The scene in one frame: `Frame.scene`."""
+    """The scene in one frame: `Frame.scene`. `SceneKey.of` reads plugins' keys of its objects, materials and lights."""
 
     @property
     def lights(self) -> Sequence[Any]:
@@ -75,6 +75,18 @@ class FrameScene(Protocol):
     @property
     def objects(self) -> Sequence[Any]:
         """Placed objects with `name`, `mesh`, `material`, `transform`, `casts_shadow`, `hidden`."""
+        ...
+
+    @property
+    def camera(self) -> Any:
+        """The scene's camera with `name`, `transform` and its other values; `Frame.camera` has the matrices."""
+        ...
+
+    def pixels(self, image: Any) -> npt.NDArray[np.float32]:
+        """Decode an image that is the value of a `SceneKey`: (height, width, 4), top row first.
+
+        Integers become 0 to 1 as they are stored, without a transfer function; HDR and EXR files give linear light.
+        """
         ...
 
     @property

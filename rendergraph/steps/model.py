@@ -211,7 +211,7 @@ class Step(Struct, frozen=True, gc=False):
         return self.reads + tuple(read for function in self.functions for read in function.reads)
 
 
-SceneSource = Literal["transforms", "lights", "materials", "environment"]
+SceneSource = Literal["transforms", "lights", "materials", "environment", "camera"]
 
 
 class Upload(Struct, frozen=True, eq=False):

@@ -373,7 +373,8 @@ class Steps:
                 (height, width, channels), behind the layers or the depth if there are several; axes of length 1 may be
                 left out. `values[y, x]` is what `texelFetch` reads at (x, y). Formats with 8-bit channels take bytes,
                 or floats from 0 to 1. A buffer takes an array of any shape, in its own type.
-            changes_with: what of the scene the function looks at: `transforms`, `lights`, `materials`, `environment`.
+            changes_with: what of the scene the function looks at: `transforms`, `lights`, `materials`, `environment`,
+                `camera`; values of plugins' keys belong to their entries, those of objects to `transforms`.
             label: see the class.
         """
         part = checks.part_of(self.ports, out, "out")

@@ -1,0 +1,92 @@
+"""Keys that plugins add to the objects, materials, lights and cameras of scene files."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args, get_origin
+
+from msgspec import Struct
+
+from rendergraph.facts import Extra
+from rendergraph.typecheck import MOST, Range, conversion_to, test_of
+
+if TYPE_CHECKING:
+    from rendergraph.keys import Key
+
+Section: TypeAlias = Literal["objects", "materials", "lights", "cameras"]
+"""A section of scene files whose entries plugins may add keys to."""
+_MOST_NUMBERS = 16
+
+
+class Image(Struct, frozen=True):
+    """The type of a scene key that names an image file, relative to the scene file.
+
+    Its value has a `size`, width and height, and `channels`; `FrameScene.pixels` decodes it.
+    """
+
+
+class SceneKey(Struct, frozen=True, dict=True):
+    """A key that a plugin adds to objects, materials, lights or cameras of scene files: `Extension.scene_keys`.
+
+    Attributes:
+        name: a word of small letters, digits and `_`.
+        type: `float`, `int`, `bool`, `str`, a `Literal` of words, a tuple of 2 to 16 floats
+            (`tuple[float, float, float]`), or `Image`. Keyframes can animate floats and tuples.
+        doc: one line.
+        default: the value of an entry that does not give the key.
+        unit: the unit's symbol, empty for a pure number.
+        min, max: smallest and largest legal number, inclusive.
+    """
+
+    name: str
+    type: Any
+    doc: str
+    default: Any = None
+    unit: str = ""
+    min: float | None = None
+    max: float | None = None
+
+    def of(self, entry: Any) -> Any:
+        """Return the value that an object, material, light or camera has, or else the default.
+
+        It takes those of `facts` as well as those of a frame's scene.
+        """
+        extra: Extra = entry.extra
+        return extra.get(self.name, self.default)
+
+    @cached_property
+    def key(self) -> Key:
+        """It as a key of a table."""
+        from rendergraph.keys import Key  # for scene files with such keys alone
+
+        return Key(self.name, self._annotation(), self.doc, self.default, self.unit)
+
+    def mistake(self) -> str:
+        """What is wrong with the declaration, as the end of a sentence; empty if nothing is."""
+        numbers = get_args(self.type) if get_origin(self.type) is tuple else ()
+        words = get_args(self.type) if get_origin(self.type) is Literal else ()
+        is_row = 2 <= len(numbers) <= _MOST_NUMBERS and {*numbers} == {float}
+        is_choice = bool(words) and all(isinstance(word, str) for word in words)
+        if not (is_row or is_choice or self.type in (float, int, bool, str, Image)):
+            kinds = "float, int, bool, str, a Literal of words, a tuple of 2 to 16 floats or Image"
+            return f"has the type {self.type!r}; use {kinds}"
+        has_numbers = is_row or self.type in (float, int)
+        if (self.min is not None or self.max is not None) and not has_numbers:
+            return "has limits, which are for numbers"
+        if self.min is not None and self.max is not None and self.min > self.max:
+            return f"has the limits {self.min} and {self.max}, between which no number lies"
+        if self.default is not None and self.type is Image:
+            return "is an image, which has no default"
+        annotation = self._annotation()
+        if self.default is not None and not test_of(annotation)(conversion_to(annotation)(self.default)):
+            return f"has the default {self.default!r}, which is not a legal value of it"
+        return "" if self.doc.strip() else "has no documentation (doc)"
+
+    def _annotation(self) -> Any:
+        from rendergraph.keys.values import FILE, TEXT, number, vector  # as above
+
+        low, high = -MOST if self.min is None else self.min, MOST if self.max is None else self.max
+        if get_origin(self.type) is tuple:
+            return vector(len(get_args(self.type)), low, high)
+        simple = {float: number(low, high), int: Annotated[int, Range(low, high)], bool: bool, str: TEXT, Image: FILE}
+        return simple.get(self.type, self.type)
