@@ -469,3 +469,14 @@ def test_nothing_is_linked_to_the_scene(bench: Any) -> None:
     shaders = {"plain.frag": WHITE, "of.frag": PLACE}
     with pytest.raises(InputError, match=r"'a.scene' expects a scene, but 'p.color' .* leave it out"):
         bench.pipeline(text, Of, Plain, shaders=shaders).check()
+
+
+def test_a_shader_file_takes_the_scene_by_its_header(gl: rg.Session, tmp_path: Path) -> None:
+    header = "/*---\ndoc: Place.\ninputs: {scene: {semantic: scene_data, doc: Scene.}}\n"
+    header += "outputs: {color: {format: rgba32f, size: [1, 1], doc: Texel.}}\n---*/\n"
+    (tmp_path / "place.frag").write_text(header + PLACE.replace("vec2(0.0)", "vec2(0.0, 1.0)"))
+    (tmp_path / "scene.yaml").write_text("scene: 1\n" + BOXES)
+    text = "rendergraph: 1\nscene: scene.yaml\nnodes: {a: {type: ./place.frag}}\noutputs: {image: a.color}\n"
+    (tmp_path / "test.yaml").write_text(text)
+    texel = gl.render(rg.load(tmp_path / "test.yaml"))["image"][0, 0]
+    np.testing.assert_array_equal(np.abs(texel), [0.5, 0.5, 0.5, 2.0])  # a corner of the box, and where the other is
