@@ -248,6 +248,49 @@ def test_every_verb_and_shipped_file_is_listed(generated: Path) -> None:
         assert all(f"## {file.stem}\n" in text for file in folder.glob("*.yaml"))
 
 
+def test_every_function_of_the_shared_includes_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A comment above it says what it returns; arguments are in the comment, or in the table of common arguments."""
+    monkeypatch.syspath_prepend(str(DOCS))
+    includes: Any = importlib.import_module("_generate.includes")
+    common = {name for names in includes.ARGUMENTS for name in names.split(", ")}
+    (_, page), *_ = includes.pages()
+    found, missing = 0, []
+    for file in sorted((ROOT / "shaders" / "include").glob("*.glsl")):
+        assert f"### `<{file.name}>`" in page
+        text = file.read_text(encoding="utf-8")
+        assert includes.header(text), f"{file.name} does not begin with a comment"
+        for one in includes.functions(text):
+            found += 1
+            assert f"| `{one.declaration}` |" in page
+            unknown = [
+                name for name in one.arguments if name not in common and not re.search(rf"\b{name}\b", one.comment)
+            ]
+            missing += [f"{file.name}: {one.declaration}: {unknown}"] if unknown or not one.comment else []
+    assert not missing
+    assert found > 80
+
+
+def test_what_the_page_says_of_a_function_is_in_its_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(DOCS))
+    includes: Any = importlib.import_module("_generate.includes")
+    text = (
+        "// Fog.\n#include <view.glsl>\nuniform sampler2D depth;\n\n"
+        "// What is left, 0 to 1, of light from a `place`.\n// In metres.\nfloat fog(vec3 place,\n          int n) {\n"
+        "#ifdef HAS_HAZE\n    return shadow(n, place, depth_views[0].eye.xyz);\n#endif\n    return 0.0;\n}\n"
+        "float later();  // defined by the shader\n"
+    )
+    fog, later = includes.functions(text)
+    assert fog == includes.Function(
+        "fog",
+        "float fog(vec3 place, int n)",
+        ("place", "n"),
+        "What is left, 0 to 1, of light from a `place`. In metres.",
+        "`shadow()`, `depth_views`, `HAS_HAZE`",
+    )
+    assert (later.declaration, later.comment) == ("float later()", "defined by the shader")
+    assert includes.header(text) == "Fog.\n"
+
+
 @pytest.mark.parametrize("page", ["docs/how-it-works.md", "CONTRIBUTING.md", "tests/README.md"])
 def test_the_files_that_a_page_names_exist(page: str) -> None:
     folders = ("rendergraph", "nodes", "shaders", "tests", "docs")

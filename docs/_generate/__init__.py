@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from . import api, cli, errors, files, nodes, pipelines, types
+from . import api, cli, errors, files, includes, nodes, pipelines, types
 from .pictures import Studio
 
 ROOT = Path(__file__).parents[2]
@@ -65,4 +65,5 @@ def _pages(studio: Studio) -> Iterator[tuple[str, str]]:
     yield from cli.pages()
     yield from files.pages()
     yield from types.pages()
+    yield from includes.pages()
     yield from api.pages()

@@ -1,5 +1,7 @@
 // Radiance seen through the air between the viewer and a position. The in-scattered radiance counts as ambient light.
 #ifdef HAS_AIR
+// `radiance` that leaves a position, as it arrives at the viewer: what the air lets through, and what it scatters in.
+// Unchanged where no `air` is connected.
 vec3 through_air(vec3 position, vec3 radiance) {
     vec4 air = air_at(position);
     radiance *= air.a;
@@ -9,7 +11,7 @@ vec3 through_air(vec3 position, vec3 radiance) {
     return min(radiance, 65504.0);  // the largest half float
 }
 
-// The same without the in-scattered radiance, for light that is added to a picture.
+// The same `radiance` without what is scattered in, for light that is added to a picture.
 vec3 attenuated(vec3 position, vec3 radiance) {
     return radiance * air_at(position).a;
 }

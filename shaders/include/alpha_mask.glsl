@@ -1,5 +1,7 @@
-// Alpha masking. With multisampling, alpha is extrapolated linearly to each sample position (alpha to coverage), so
-// that the edges of the mask are antialiased.
+// Alpha masking.
+
+// Discards this fragment where its alpha is below the `cutoff`. With multisampling, alpha is extrapolated linearly to
+// each sample position (alpha to coverage), so that the edges of the mask are antialiased.
 void alpha_test(float alpha, float cutoff) {
 #if PASS_SAMPLES > 1
     vec2 gradient = vec2(dFdx(alpha), dFdy(alpha));

@@ -2,7 +2,7 @@
 // mix(alpha, 1, strength²) along the tangent.
 #include <brdf.glsl>
 
-// Distribution times visibility, D V. The half vector has unit length, and NoL and NoV are at least 0.
+// Distribution times visibility, D V, in 1/sr. NoL and NoV are at least 0.
 float anisotropic_specular(Surface s, vec3 light_dir, vec3 half_vector, float NoL, float NoV) {
     float alpha_b = max(s.roughness * s.roughness, 0.001);
     float alpha_t = mix(alpha_b, 1.0, s.anisotropy * s.anisotropy);

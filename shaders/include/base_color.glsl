@@ -9,6 +9,7 @@ centroid in vec4 v_color;
 uniform sampler2D base_color_texture;
 #endif
 
+// Base colour and alpha of this fragment, scene-linear, before any alpha test. `material` is `v_material`.
 vec4 fragment_base_color(int material) {
     vec4 color = materials[MATERIAL_INDEX(material)].base_color;
 #ifdef HAS_BASE_COLOR_TEXTURE

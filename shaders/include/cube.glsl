@@ -17,7 +17,7 @@ vec2 cube_texel_center(ivec2 texel, int size) {
     return (vec2(texel) + 0.5) * (2.0 / float(size)) - 1.0;
 }
 
-// Solid angle in steradians of a texel that is centred at a position.
+// Solid angle in steradians of a texel that is centred at a position, on a face of `size` × `size` texels.
 float cube_solid_angle(vec2 position, int size) {
     float squared_distance = 1.0 + dot(position, position);
     return 4.0 / (float(size * size) * squared_distance * sqrt(squared_distance));

@@ -15,11 +15,13 @@ vec3 position_from_depth(ivec2 texel, vec2 offset, float window_depth) {
     return world_position(depth_views[0], (vec2(texel) + offset) * depth_views[0].viewport.zw, window_depth);
 }
 
+// World-space position of one sample of a texel, and its window depth.
 vec3 position_at_sample(ivec2 texel, int sample_index, out float window_depth) {
     window_depth = texelFetch(depth, texel, sample_index).r;
     return position_from_depth(texel, SAMPLE_POSITION(sample_index), window_depth);
 }
 
+// World-space position of a sample, or of the centre of a texel with TEXEL_CENTER, and its window depth.
 vec3 position_at(ivec2 texel, int sample_index, out float window_depth) {
 #if DEPTH_SAMPLES > 1
     if (sample_index == TEXEL_CENTER) {
@@ -32,8 +34,9 @@ vec3 position_at(ivec2 texel, int sample_index, out float window_depth) {
     return position_at_sample(texel, sample_index, window_depth);
 }
 
-// Difference of world positions between neighbouring texels along a screen axis. It is taken towards the neighbour on
-// the side where depth is closer to linear, which is the side that lies on the same surface.
+// Difference of world positions between neighbouring texels along a screen axis, (1, 0) or (0, 1), in metres per texel.
+// It is taken towards the neighbour on the side where depth is closer to linear, which is the side that lies on the
+// same surface. `position` is the texel's own.
 vec3 screen_derivative(ivec2 texel, int sample_index, ivec2 axis, vec3 position, float window_depth) {
     ivec2 last = ivec2(depth_views[0].viewport.xy) - 1;
     float left = texelFetch(depth, max(texel - axis, ivec2(0)), sample_index).r;
@@ -49,7 +52,8 @@ vec3 screen_derivative(ivec2 texel, int sample_index, ivec2 axis, vec3 position,
     return use_left ? position - other : other - position;
 }
 
-// Unit geometric normal of the surface at a texel, facing the viewer.
+// Unit geometric normal of the surface at a texel, in world space, facing the viewer. `position` and `window_depth` are
+// those of the texel.
 vec3 geometric_normal_at(ivec2 texel, int sample_index, vec3 position, float window_depth) {
     if (sample_index == TEXEL_CENTER) position = position_at_sample(texel, sample_index = 0, window_depth);
     vec3 dx = screen_derivative(texel, sample_index, ivec2(1, 0), position, window_depth);

@@ -13,6 +13,8 @@ vec3 downsample_weights(int index, int size) {
 
 vec4 source_texel(ivec2 texel);  // the value of a texel of the level above, which the including shader defines
 
+// Value of a texel of the new level: the weighted mean of up to 3 × 3 texels of the level above, which has `size`
+// texels.
 vec4 downsample(ivec2 texel, ivec2 size) {
     vec3 weights_x = downsample_weights(texel.x, size.x);
     vec3 weights_y = downsample_weights(texel.y, size.y);

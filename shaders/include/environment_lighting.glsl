@@ -52,8 +52,8 @@ vec3 prefiltered_environment(Surface s) {
 #endif
 }
 
-// Light reflected from the environment, or the ambient constant. The diffuse part is not yet multiplied by the diffuse
-// reflectance. The empirical shading models reflect no specular environment light.
+// Light reflected from the environment, or the ambient constant: radiance towards the viewer. The diffuse part is not
+// yet multiplied by the diffuse reflectance. The empirical shading models reflect no specular environment light.
 ReflectedLight environment_lighting(Surface s) {
 #ifndef HAS_ENVIRONMENT
     return ReflectedLight(ambient, vec3(0.0));

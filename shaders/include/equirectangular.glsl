@@ -1,8 +1,8 @@
 // Equirectangular maps: u = 0.5 + atan(z, x) / 2π, v = acos(y) / π from the top row.
 #include <math.glsl>
 
-// Radiance in a unit direction, averaged over about `angle` radians. The sampler repeats along u. v is clamped here, so
-// that filtering does not mix the two poles.
+// Radiance in a unit direction, averaged over about `angle` radians, from the equirectangular `map`. The sampler
+// repeats along u. v is clamped here, so that filtering does not mix the two poles.
 vec3 equirectangular_radiance(sampler2D map, vec3 direction, float angle) {
     vec2 size = vec2(textureSize(map, 0));
     float lod = max(log2(max(angle * size.y / PI, 1e-6)), 0.0);

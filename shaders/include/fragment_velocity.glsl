@@ -5,6 +5,7 @@
 centroid in vec4 v_clip_position;
 centroid in vec4 v_previous_clip_position;
 
+// Motion of this fragment since the previous frame, in widths and heights of the picture; see `velocity_between()`.
 vec2 fragment_velocity() {
     return velocity_between(v_clip_position, PASS_VIEW, v_previous_clip_position, PREVIOUS_PASS_VIEW);
 }

@@ -19,6 +19,8 @@ in vec4 in_tangent;
 centroid out vec4 v_tangent;
 #endif
 
+// Writes gl_Position and every varying of this vertex: `v_position`, `v_normal`, `v_object`, those of the material, of
+// the tangent frame and of the velocity.
 void transform_vertex() {
     v_position = object_to_world(in_position);
 #if PASS_SAMPLES > 1

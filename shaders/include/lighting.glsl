@@ -40,7 +40,7 @@ ReflectedLight direct_lighting(Surface s, int light) {
 #endif
 }
 
-// Adds the light of one source; with DIRECTIONALS_ONLY, only of a directional light.
+// Adds the light of one source to `sum`; with DIRECTIONALS_ONLY, only of a directional light.
 void add_direct_lighting(Surface s, int light, inout ReflectedLight sum) {
 #if LIGHT_COUNT > 0 && !defined(NO_LIGHTS)
 #ifdef DIRECTIONALS_ONLY

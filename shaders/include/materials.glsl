@@ -48,7 +48,8 @@ const int SPECULAR_COLOR_SLOT = 7;
 #define MATERIAL_INDEX(index) (index)
 #endif
 
-// Texture coordinates of a texture slot, with its KHR_texture_transform if the batch has one.
+// Texture coordinates of a texture slot (BASE_COLOR_SLOT, …), with its KHR_texture_transform if the batch has one. `uv`
+// are the mesh's own.
 vec2 slot_uv(int material, int slot, vec2 uv) {
 #ifdef HAS_UV_TRANSFORM
     vec4 u = material_uvs[MATERIAL_INDEX(material) * 16 + slot * 2];

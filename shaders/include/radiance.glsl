@@ -19,12 +19,12 @@ vec3 direct_irradiance = vec3(0.0);  // of all lights together
 
 const float MAX_HALF_FLOAT = 65504.0;  // larger values would overflow to infinity in a half-float texture
 
-// The view-independent part, which lights other surfaces.
+// The view-independent part of reflected light, which lights other surfaces.
 ReflectedLight diffuse_only(ReflectedLight light) {
     return ReflectedLight(light.diffuse, vec3(0.0));
 }
 
-// The sum of the terms that the parameter `terms` selects.
+// The sum of the terms of reflected light that the parameter `terms` selects.
 vec3 selected_terms(ReflectedLight light) {
     vec3 sum = vec3(0.0);
 #if TERMS == TERMS_ALL || TERMS == TERMS_DIFFUSE
@@ -54,14 +54,15 @@ float environment_visibility(Surface s) {
 }
 
 #ifdef HAS_REFLECTIONS
+// The connected `reflections` at this fragment: radiance, and in alpha the confidence from 0 to 1.
 vec4 reflections_at_fragment() {
     vec4 reflected = texelFetch(reflections, ivec2(gl_FragCoord.xy), 0);
     return reflected.a > 0.0 ? min(reflected, vec4(vec3(MAX_HALF_FLOAT), 1.0)) : vec4(0.0);
 }
 #endif
 
-// Environment lighting, scaled by occlusion and multiplied by the reflectance. `reflections` replace its specular part
-// by their confidence. Of the constant ambient light they replace what metals reflect. They are not occluded.
+// The light of `environment`, scaled by occlusion and multiplied by the reflectance. `reflections` replace its specular
+// part by their confidence. Of the constant ambient light they replace what metals reflect. They are not occluded.
 ReflectedLight reflected_environment(Surface s, ReflectedLight environment) {
 #if !defined(NO_LIGHTS) && (TERMS == TERMS_ALL || TERMS == TERMS_AMBIENT)
     float visibility = environment_visibility(s);
@@ -106,8 +107,8 @@ vec3 occluded_reflection(Surface s) {
 #endif
 }
 
-// Radiance towards the viewer from emission, direct lighting and environment lighting. Terms that are not selected are
-// left out. `with_specular` is false for the part that lights other surfaces.
+// Radiance towards the viewer from emission, `direct` lighting and `environment` lighting. Terms that are not selected
+// are left out. `with_specular` is false for the part that lights other surfaces.
 vec3 radiance_of(Surface s, ReflectedLight direct, ReflectedLight environment, bool with_specular) {
 #ifdef NO_LIGHTS
     return unlit_radiance(s);
@@ -128,6 +129,7 @@ vec3 radiance_of(Surface s, ReflectedLight direct, ReflectedLight environment, b
 #endif
 }
 
+// The same, `direct` and `environment` lighting with their specular parts.
 vec3 radiance_of(Surface s, ReflectedLight direct, ReflectedLight environment) {
     return radiance_of(s, direct, environment, true);
 }

@@ -89,11 +89,12 @@ layout(std430) readonly buffer scene_emitter_block {
     SceneEmitter scene_emitters[];  // SCENE_EMITTER_COUNT
 };
 
+// Whether an instance has a `flag`: SCENE_CASTS_SHADOW, SCENE_MIRRORED, …
 bool scene_has(int instance, int flag) {
     return (scene_instances[instance].flags & flag) != 0;
 }
 
-// The command that draws an instance, or nothing.
+// The command that draws an instance, or nothing where `is_drawn` is false.
 DrawCommand scene_draw_command(int instance, bool is_drawn) {
     SceneInstance i = scene_instances[instance];
     return DrawCommand(uint(3 * i.triangles), is_drawn ? 1u : 0u, uint(i.first_index), i.base_vertex, uint(instance));
@@ -106,16 +107,19 @@ ivec3 scene_triangle(int instance, int triangle) {
     return i.base_vertex + ivec3(scene_indices[first], scene_indices[first + 1], scene_indices[first + 2]);
 }
 
+// Object-space position of a vertex, in metres.
 vec3 scene_vertex_position(int vertex) {
     float p[3] = scene_vertices[vertex].position;
     return vec3(p[0], p[1], p[2]);
 }
 
+// Object-space unit normal of a vertex.
 vec3 scene_vertex_normal(int vertex) {
     float n[3] = scene_vertices[vertex].normal;
     return vec3(n[0], n[1], n[2]);
 }
 
+// Object-space tangent of a vertex, and the bitangent's sign in w.
 vec4 scene_vertex_tangent(int vertex) {  // 0 where the mesh has none
 #ifdef SCENE_TANGENTS_STREAM
     float t[4] = scene_vertices[vertex].tangent;
@@ -125,6 +129,7 @@ vec4 scene_vertex_tangent(int vertex) {  // 0 where the mesh has none
 #endif
 }
 
+// Texture coordinates of a vertex; `set` is 0 or 1.
 vec2 scene_vertex_uv(int vertex, int set) {  // 0 where the mesh has none
     vec2 uv = vec2(0.0);
 #ifdef SCENE_UV0_STREAM
@@ -136,6 +141,7 @@ vec2 scene_vertex_uv(int vertex, int set) {  // 0 where the mesh has none
     return uv;
 }
 
+// Colour of a vertex, linear RGB and alpha.
 vec4 scene_vertex_color(int vertex) {  // white where the mesh has none
 #ifdef SCENE_COLORS_STREAM
     float c[4] = scene_vertices[vertex].color;
@@ -145,12 +151,14 @@ vec4 scene_vertex_color(int vertex) {  // white where the mesh has none
 #endif
 }
 
+// World-space position of an object-space `point` of an instance.
 vec3 scene_point_to_world(int instance, vec3 point) {
     vec4 rows[3] = scene_instances[instance].rows;
     vec4 p = vec4(point, 1.0);
     return vec3(dot(rows[0], p), dot(rows[1], p), dot(rows[2], p));
 }
 
+// World-space vector of an object-space `direction` of an instance; not normalized.
 vec3 scene_direction_to_world(int instance, vec3 direction) {
     vec4 rows[3] = scene_instances[instance].rows;
     return vec3(dot(rows[0].xyz, direction), dot(rows[1].xyz, direction), dot(rows[2].xyz, direction));
@@ -169,6 +177,7 @@ vec3 scene_normal_to_world(int instance, vec3 normal) {
 #endif
 }
 
+// Weights of a triangle's three vertices at a point.
 vec3 scene_weights(vec2 barycentrics) {
     return vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics);
 }
@@ -182,6 +191,7 @@ mat3 scene_corners(int instance, int triangle) {
         scene_point_to_world(instance, scene_vertex_position(v.z)));
 }
 
+// World-space position of a point of a triangle.
 vec3 scene_position(int instance, int triangle, vec2 barycentrics) {
     return scene_corners(instance, triangle) * scene_weights(barycentrics);
 }
@@ -208,6 +218,7 @@ struct SceneCoordinates {
     vec2 uv[2];
 };
 
+// Texture coordinates at a point of the triangle of the vertices `v`, with the weights `w`.
 SceneCoordinates scene_coordinates(ivec3 v, vec3 w) {
     SceneCoordinates c;
     for (int set = 0; set < 2; ++set) {
@@ -217,13 +228,15 @@ SceneCoordinates scene_coordinates(ivec3 v, vec3 w) {
 }
 
 #ifdef SCENE_TEXTURES
+// A texture coordinate `u` from 0 to 1, as the wrap `mode` of a sampler has it: 0 repeats, 1 mirrors, 2 clamps.
 float scene_wrapped(float u, int mode) {
     float mirrored = 1.0 - abs(mod(u, 2.0) - 1.0);
     return mode == 0 ? fract(u) : mode == 1 ? mirrored : clamp(u, 0.0, 1.0);
 }
 
-// The texel of a slot at level 0 as its sampler has it; false if the material or the mesh lacks it. `arrays` are the
-// arrays that textures of the slot lie in, a constant. The border of a layer holds what lies across the image's edges.
+// The texel of a slot at level 0 as its sampler has it, at the coordinates `c`; false if the material or the mesh lacks
+// it. `arrays` are the arrays that textures of the slot lie in, a constant. The border of a layer holds what lies
+// across the image's edges.
 bool scene_texel(int instance, int slot, int arrays, SceneCoordinates c, out vec4 texel) {
     int material = MATERIAL_INDEX(scene_instances[instance].material);
     ivec4 entry = scene_textures[material * 8 + slot];
@@ -261,7 +274,7 @@ bool scene_texel(int instance, int slot, int arrays, SceneCoordinates c, out vec
 }
 #endif
 
-// Base colour and alpha: material factor × texture × vertex colour.
+// Base colour and alpha: material factor × texture × vertex colour, with `v` and `w` as above and the coordinates `c`.
 vec4 scene_base_color(int instance, ivec3 v, vec3 w, SceneCoordinates c) {
     vec4 color = materials[MATERIAL_INDEX(scene_instances[instance].material)].base_color;
 #ifdef SCENE_BASE_COLOR_ARRAYS
@@ -282,7 +295,8 @@ float scene_alpha(int instance, int triangle, vec2 barycentrics) {
 }
 
 // As `tangent_frame()` of `fragment_surface.glsl`: the mesh's own tangents, else along the texture coordinates of the
-// normal map. `is_front`: the triangle turns counter-clockwise for the viewer.
+// normal map. `v`, `w` and `corners` are the triangle's vertices, their weights and their world-space positions.
+// `is_front`: the triangle turns counter-clockwise for the viewer.
 void scene_tangent_frame(
     int instance, ivec3 v, vec3 w, mat3 corners, bool is_front, vec3 normal, out vec3 tangent, out vec3 bitangent) {
 #ifdef SCENE_TANGENTS_STREAM

@@ -39,13 +39,15 @@ void physical_reflectance(inout Surface s, vec4 dielectric) {
     s.f90 = mix(dielectric.a, 1.0, s.metallic);
 }
 
-// The Phong exponent n with about the same highlight as GGX: 4 n = 2 / alpha² - 2.
+// The Phong exponent n with about the same highlight as GGX at a `roughness` from 0 to 1: 4 n = 2 / alpha² - 2.
 float phong_exponent(float roughness) {
     float alpha = max(roughness * roughness, 0.001);
     return 0.5 / (alpha * alpha) - 0.5;
 }
 
 #ifdef MATERIAL_COUNT
+// f0 (rgb) and f90 (w) of a material's dielectric part; `specular` has its specular colour and, in w, factor at this
+// point.
 vec4 dielectric_of(MaterialData m, vec4 specular) {
 #ifdef DEFAULT_SPECULAR  // all materials have the default index of refraction and specular colour
     return vec4(0.04, 0.04, 0.04, 1.0);
@@ -60,8 +62,8 @@ const bool BATCH_HAS_METALLIC_ROUGHNESS = true;
 const bool BATCH_HAS_METALLIC_ROUGHNESS = false;
 #endif
 
-// Coefficients of the empirical models: the material's own kd, ks and ka. With a metallic-roughness texture they follow
-// from the physical ones instead: kd = base colour × (1 - metallic), ks = f0.
+// Coefficients of the empirical models: the material's own kd, ks and ka. With a metallic-roughness texture
+// (`has_metallic_roughness`) they follow from the physical ones instead: kd = base colour × (1 - metallic), ks = f0.
 void empirical_reflectance(inout Surface s, MaterialData m, bool has_metallic_roughness) {
     s.exponent = phong_exponent(s.roughness);
     if (has_metallic_roughness) return;
@@ -73,11 +75,13 @@ void empirical_reflectance(inout Surface s, MaterialData m, bool has_metallic_ro
     s.exponent = m.phong_diffuse.w;
 }
 
+// The same, for the material of this batch.
 void empirical_reflectance(inout Surface s, MaterialData m) {
     empirical_reflectance(s, m, BATCH_HAS_METALLIC_ROUGHNESS);
 }
 
-// Derives the reflectance that the shading model of this program reads.
+// Derives the reflectance that the shading model of this program reads from base colour, metallic and roughness.
+// `specular` and `has_metallic_roughness` are as above.
 void derive_reflectance(inout Surface s, MaterialData m, vec4 specular, bool has_metallic_roughness) {
     s.dielectric = dielectric_of(m, specular);
     physical_reflectance(s, s.dielectric);
@@ -86,6 +90,7 @@ void derive_reflectance(inout Surface s, MaterialData m, vec4 specular, bool has
 #endif
 }
 
+// The same for the material of this batch, with its `specular`.
 void derive_reflectance(inout Surface s, MaterialData m, vec4 specular) {
     derive_reflectance(s, m, specular, BATCH_HAS_METALLIC_ROUGHNESS);
 }

@@ -16,11 +16,13 @@ centroid out vec4 v_previous_clip_position;
 
 invariant gl_Position;
 
+// World-space position of an object-space position `p`.
 vec3 object_to_world(vec3 p) {
     vec4 q = vec4(p, 1.0);
     return vec3(dot(in_object0, q), dot(in_object1, q), dot(in_object2, q));
 }
 
+// World-space vector of an object-space direction `d`; not normalized.
 vec3 direction_to_world(vec3 d) {
     return vec3(dot(in_object0.xyz, d), dot(in_object1.xyz, d), dot(in_object2.xyz, d));
 }
@@ -30,8 +32,9 @@ float handedness() {
     return dot(in_object0.xyz, cross(in_object1.xyz, in_object2.xyz)) < 0.0 ? -1.0 : 1.0;
 }
 
-// Normals are transformed by the cofactor matrix, which is right for any scale, times the sign of the determinant for
-// mirrored objects. With UNIFORM_SCALE all objects have uniform scale, and the matrix itself is enough.
+// World-space normal of an object-space normal `n`; a unit vector, unless UNIFORM_SCALE is defined. Normals are
+// transformed by the cofactor matrix, which is right for any scale, times the sign of the determinant for mirrored
+// objects. With UNIFORM_SCALE all objects have uniform scale, and the matrix itself is enough.
 vec3 normal_to_world(vec3 n) {
 #ifdef UNIFORM_SCALE
     return direction_to_world(n);
@@ -44,6 +47,7 @@ vec3 normal_to_world(vec3 n) {
 #endif
 }
 
+// Clip-space position of a world-space position in the view of this pass.
 vec4 world_to_clip(vec3 position) {
     return PASS_VIEW.view_projection * vec4(position, 1.0);
 }

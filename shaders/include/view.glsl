@@ -23,19 +23,19 @@ bool is_nothing(float depth) {
     return depth == 0.0;
 }
 
-// Whether a depth is in front of another.
+// Whether a depth is in front of an `other` one.
 bool nearer(float depth, float other) {
     return depth > other;
 }
 
-// View-space position of a window position (0 to 1 from the bottom left) and a window depth.
+// View-space position, in metres, of a window position and depth.
 vec3 view_space_position(View v, vec2 uv, float depth) {
     vec4 p = v.inverse_projection * vec4(uv * 2.0 - 1.0, depth, 1.0);
     return p.xyz / p.w;
 }
 
-// World-space position. It goes through view space, where numbers near the eye are small, so that float32 loses less
-// than with the combined inverse matrix.
+// World-space position, in metres, of a window position and depth. It goes through view space, where numbers near the
+// eye are small, so that float32 loses less than with the combined inverse matrix.
 vec3 world_position(View v, vec2 uv, float depth) {
     return (v.inverse_view * vec4(view_space_position(v, uv, depth), 1.0)).xyz;
 }
