@@ -63,6 +63,8 @@ _GENERATED = (
     (r"rendergraph/errors/", "errors/index.md"),
     (r"rendergraph/api/__init__\.py", "node-api.md"),
     (r"rendergraph/api/projection\.py", "views.md"),
+    (r"rendergraph/cli/(\w+)\.py", r"cli.md#\1"),
+    (r"shaders/include/", "includes.md"),
     (r"nodes/(?:\w+/)*_\w+\.py", "nodes/bases.md"),
     (r"nodes/(?:\w+/)*(\w+)\.py", r"nodes/\1.md"),
     (r"nodes/", "nodes/index.md"),
@@ -83,7 +85,7 @@ def _link_generated(app: Sphinx, docname: str, source: list[str]) -> None:
     include = "```{include} \\1\n```"
     text = re.sub(r"^<!-- \{include\} (\S+) -->$", include, source[0], flags=re.MULTILINE)
     text = re.sub(r"^\[[^\]]*\]\((\S+)\)<!-- \{include\} -->$", include, text, flags=re.MULTILINE)
-    source[0] = re.sub(r"\]\((?:\.\./)+((?:rendergraph|nodes|pipelines)/[^)\s]*)\)", linked, text)
+    source[0] = re.sub(r"\]\((?:\.\./)+((?:rendergraph|nodes|pipelines|shaders/include)/[^)\s]*)\)", linked, text)
 
 
 def setup(app: Sphinx) -> None:
