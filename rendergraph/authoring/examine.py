@@ -21,7 +21,7 @@ from rendergraph.catalog import Catalog, NodeType
 from rendergraph.catalog.types import shared_includes
 from rendergraph.declare import Function, Input, Node, Views, WrittenPort
 from rendergraph.declare.blame import declaration_of
-from rendergraph.errors import InputError, Problem, shown_file
+from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.glsl import Includes, read_text, strip_comments
 
 LONGEST_DOC = 160
@@ -80,6 +80,10 @@ def examine(
         for name in _unused(node, check.active, check.files):
             text = f"'{name}' is declared, but no shader program uses it, or it has no effect there"
             problems.append(Problem("RG455", text, declaration_of(node.cls, node.file, name), severity=severity))
+        for ((file, line), name), used in check.keywords.items():
+            if not used:
+                text = f"the step is given {name}=…, but no program of it uses '{name}', or it has no effect there"
+                problems.append(Problem("RG455", text, Place(shown_file(file), line, 1), severity="warning"))
     return Report(node.name, tuple(check.tried), tuple(dict.fromkeys(problems)))
 
 

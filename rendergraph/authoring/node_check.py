@@ -15,7 +15,7 @@ from msgspec import structs
 from rendergraph.authoring.harness import HarnessGraph
 from rendergraph.authoring.variants import NodeVariant
 from rendergraph.catalog import NodeType
-from rendergraph.compile.executable import Draw
+from rendergraph.compile.executable import CompiledStep, Draw
 from rendergraph.declare import Node
 from rendergraph.declare.blame import cause_chain, declaration_in, declaration_of, source_location
 from rendergraph.errors import InputError, Place, Problem, RendergraphError, shown_file
@@ -56,6 +56,7 @@ class NodeCheck:
         self.type, self.folder, self.scene = node, folder, scene
         self.tried: list[str] = []
         self.active: set[str] = set()
+        self.keywords: dict[tuple[tuple[str, int], str], bool] = {}  # those of steps: whether a program uses them
         self.files: set[Path] = set()
         self._problems: dict[Problem, list[str]] = {}  # with the variants that have them
         self._written: set[str] = set()  # outputs that some variant has
@@ -178,6 +179,7 @@ class NodeCheck:
             for compiled in steps:
                 for draw in compiled.all_draws:
                     self._interface(compiled.step, draw)
+                self._note_keywords(compiled)
                 self._note_files(compiled.step)
             drawn = [self._draw(drawing, number) for number in (0, 1) if renders]
         if renders:
@@ -196,6 +198,16 @@ class NodeCheck:
         names += [function.shader for function in step.functions if function.node == self.type.name]
         self.files |= {self.type.shader_file(name)[0] for name in names}
         self.files |= {file for _, file in step.includes}
+
+    def _note_keywords(self, compiled: CompiledStep) -> None:
+        step, parameters = compiled.step, self.type.cls.parameters()
+        if step.node != self.type.name or step.where.caller is None or not compiled.all_draws:
+            return
+        for name, _ in step.uniforms if step.kind != "upload" else ():
+            if name not in parameters:
+                key = step.where.caller, name
+                used = any(name in draw.program.uniforms for draw in compiled.all_draws)
+                self.keywords[key] = self.keywords.get(key, False) or used
 
     def _is_own(self, step: Step) -> bool:
         return step.node == self.type.name or any(f.node == self.type.name for f in step.functions)

@@ -11,7 +11,7 @@ from rendergraph.declare import Node
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.gl.programs import Program, Uniform, member_offsets, outputs_of
 from rendergraph.glsl.globals import globals_of
-from rendergraph.program import Texts, named_reads, unfit_outputs, unfit_sampler
+from rendergraph.program import Texts, named_reads, unbound_sampler, unfit_outputs, unfit_sampler, unset_uniform
 from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import BufferDesc
 
@@ -38,7 +38,7 @@ def check_program(
         sampled: names of the textures that the step binds.
     """
     for mistakes in (
-        _uniforms(step, program, uniforms, sampled, texts),
+        _uniforms(step, program, uniforms, sampled, texts, cls),
         _samplers(step, program, resources, texts),
         _blocks(step, program, blocks, texts),
         _elements(step, program, resources, texts),
@@ -54,7 +54,12 @@ def _raise_if_any(mistakes: Iterator[Problem]) -> None:
 
 
 def _uniforms(
-    step: Step, program: Program, uniforms: Mapping[str, Any], sampled: Collection[str], texts: Texts
+    step: Step,
+    program: Program,
+    uniforms: Mapping[str, Any],
+    sampled: Collection[str],
+    texts: Texts,
+    cls: type[Node],
 ) -> Iterator[Problem]:
     """A sampler that nothing is bound to would silently read another pass's texture, an unset uniform is 0."""
     uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
@@ -62,13 +67,9 @@ def _uniforms(
     files = ", ".join(file for _, file in step.shaders)
     for name, uniform in program.uniforms.items():
         if not uniform.is_opaque and name not in uniforms:
-            hint = suggestion(name, [known for known, _ in step.uniforms])
-            code, text = "RG434", f"{files} looks at uniform '{name}', which nothing sets{hint}"
+            code, text = "RG434", unset_uniform(step, name)
         elif uniform.is_opaque and name not in images and name not in sampled:
-            slot = name.endswith("_texture") and step.kind == "geometry"
-            guard = f"; not every material has it, so it stands inside #ifdef HAS_{name.upper()}" if slot else ""
-            text = f"{files} samples '{name}', but the step reads no texture of that name; "
-            code, text = "RG430", f"{text}it reads {', '.join(sorted(sampled)) or 'none'}{guard}"
+            code, text = "RG430", unbound_sampler(step, name, sampled, cls)
         elif not uniform.is_opaque and (mismatch := uniform_mismatch(uniform, uniforms[name])) is not None:
             code, text = "RG436", f"{files} {mismatch}"
         else:

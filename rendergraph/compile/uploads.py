@@ -10,6 +10,7 @@ from msgspec import Struct
 
 from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.compile.memory import Memory
+from rendergraph.errors import Misuse, Place, shown_file
 from rendergraph.gl import textures
 from rendergraph.scene.facts import FrameScene
 from rendergraph.steps import Step, Upload
@@ -56,8 +57,13 @@ class UploadedValues(Struct, eq=False):
         values, (write,) = self.upload.values, self.step().writes
         if callable(values):
             desc = self.memory.plan.resources[write.resource].desc
-            scene = FrameScene(self.scene.scene, decode=self.scene.decode)
-            values = texels(write.name, values(scene), desc, write.mip, write.layer)
+            code = getattr(getattr(values, "__func__", values), "__code__", None)
+            array = values(FrameScene(self.scene.scene, decode=self.scene.decode))
+            try:
+                values = texels(write.name, array, desc, write.mip, write.layer)
+            except Misuse as error:  # the function has returned: its first line is the nearest
+                place = Place(shown_file(code.co_filename), code.co_firstlineno, 1) if code is not None else None
+                raise Misuse(str(error), error.code, place) from None
         self._array, self._made_of = values, self._sources
 
     def write(self, parity: int) -> None:

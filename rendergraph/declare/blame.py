@@ -124,7 +124,7 @@ def author_problem(error: BaseException, cls: type, file: Path | None = None, su
     `file` is the place if the exception never came through the author's code. Of a call that the framework refused,
     the exception's name is left out.
     """
-    place = source_location(error, cls.__module__)
+    place = source_location(error, cls.__module__) or (error.place if isinstance(error, Misuse) else None)
     if place is None and file is not None and file.name:
         place = Place(shown_file(file))
     text = str(error) if isinstance(error, Misuse) else f"{describe_error(error)}{_attribute_hint(error)}"

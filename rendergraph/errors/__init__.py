@@ -222,11 +222,11 @@ class Misuse(Exception):
     """A mistake of a node's author, raised while the author's call is on the stack.
 
     The stage that called the node turns it into an `InputError` with the node, the pipeline's line and the author's
-    line.
+    line, which is `place` where no call is on the stack any more.
     """
 
-    def __init__(self, text: str, code: str = "RG423") -> None:
-        self.code = code
+    def __init__(self, text: str, code: str = "RG423", place: Place | None = None) -> None:
+        self.code, self.place = code, place
         super().__init__(text)
 
 

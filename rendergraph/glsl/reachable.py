@@ -13,13 +13,14 @@ _DEFINE = re.compile(r"([A-Za-z_]\w*)(?:\(([^()]*)\))?(.*)")
 _DEFINED = re.compile(r"(!?)\s*defined\s*\(?\s*(\w+)\s*\)?\s*\Z")
 
 
-def reachable_names(text: str) -> set[str]:
+def reachable_names(text: str, *, certain: bool = False) -> set[str]:
     """Return the names in `main` of a text without comments and in all that it uses; members after a dot do not count.
 
-    Branches of `#ifdef` are followed according to the text's own macros; of other conditions every branch counts.
+    Branches of `#ifdef` are followed according to the text's own macros; of other conditions every branch counts, or
+    none if only what is compiled for certain is asked for.
     """
     uses: dict[str, list[Sequence[str]]] = {}
-    words = tokens("\n".join(_taken(text, uses)))
+    words = tokens("\n".join(_taken(text, uses, certain)))
     if "##" in text:  # pasted names are not known
         return _names(words).union(*(_names(part) for parts in uses.values() for part in parts))
     macros, waiting = set(uses), ["main"]
@@ -43,18 +44,20 @@ def reachable_names(text: str) -> set[str]:
     return found
 
 
-def compiled_text(text: str) -> str:
+def compiled_text(text: str, *, certain: bool = False) -> str:
     """Return the lines of a text that are compiled, as far as its own macros decide it, without directives."""
-    return "\n".join(_taken(text, {}))
+    return "\n".join(_taken(text, {}, certain))
 
 
-def _taken(text: str, uses: dict[str, list[Sequence[str]]]) -> Iterator[str]:
+def _taken(text: str, uses: dict[str, list[Sequence[str]]], certain: bool) -> Iterator[str]:
     """Yield the lines that are compiled, without directives; the words of macros go to `uses`."""
     macros: set[str] = set()
     branches: list[tuple[bool, bool | None, bool]] = []  # outside is taken; this one is, None: perhaps; one was
     for line in text.replace("\\\n", " ").split("\n"):
         directive = _DIRECTIVE.match(line)
-        taken = not branches or (branches[-1][0] and branches[-1][1] is not False)
+        taken = not branches or (
+            branches[-1][0] and (branches[-1][1] is True if certain else branches[-1][1] is not False)
+        )
         if directive is None:
             if taken:
                 yield line

@@ -29,3 +29,5 @@ from rendergraph.program.text import positions_macro as positions_macro
 from rendergraph.program.text import prefix as prefix
 from rendergraph.program.text import stage_texts as stage_texts
 from rendergraph.program.text import text_key as text_key
+from rendergraph.program.unbound import unbound_sampler as unbound_sampler
+from rendergraph.program.unbound import unset_uniform as unset_uniform

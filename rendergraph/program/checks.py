@@ -14,6 +14,7 @@ from rendergraph.glsl.globals import globals_of
 from rendergraph.glsl.names import declarators, head, statements, tokens, without_directives
 from rendergraph.glsl.reachable import reachable_names
 from rendergraph.program.text import StageText, prefix, stage_texts, text_key
+from rendergraph.program.unbound import unbound
 from rendergraph.stamps import FileCache
 from rendergraph.steps import Read, Resource, Step
 from rendergraph.textures import FORMATS, GLSL_SHAPES, TextureDesc
@@ -51,12 +52,13 @@ def check_texts(
     seen: set[object] = set()
     for step in steps:
         kinds = tuple((name, sampler_of(read, resources[read.resource])) for name, read in _sampled(step, resources))
-        key = step.type, step.shaders, step.defines, step.functions, kinds, _kept(step, resources)
+        names = tuple([name for name, _ in step.uniforms])
+        key = step.type, step.shaders, step.defines, step.functions, kinds, names, _kept(step, resources)
         if not step.shaders or key in seen:
             continue  # same text as another step
         seen.add(key)
         try:
-            whole = text_key(step, types, resources, views), _kept(step, resources)
+            whole = text_key(step, types, resources, views), names, _kept(step, resources)
             warnings += _PASSED.get(whole, partial(_check_step, step, types, resources, views))
         except InputError as error:
             problems += error.problems
@@ -76,7 +78,10 @@ def _check_step(
     check_kept_text(step, partial(dict, texts), types[step.node].cls, resources)
     _check_samplers(step, texts, resources)
     _check_outs(step, texts, types[step.node].cls, resources)
-    return tuple(warning for text in texts.values() for warning in text.warnings)
+    found = [_placed(problem, text, [name]) for text, name, problem in unbound(step, texts, types[step.node].cls)]
+    if any(problem.severity == "error" for problem in found):
+        raise InputError([problem for problem in found if problem.severity == "error"])
+    return (*found, *(warning for text in texts.values() for warning in text.warnings))
 
 
 def sampler_of(read: Read, resource: Resource) -> str:

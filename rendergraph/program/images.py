@@ -1,4 +1,4 @@
-"""Images of compute shaders: their format comes from the port, and may be repeated in the shader.
+"""Images of shaders: their format comes from the port, and may be repeated in the shader.
 
 `uniform writeonly image2D board;` gets the `layout(rgba16f)` of its port; a written layout must agree with it.
 """
@@ -6,11 +6,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 from msgspec.structs import replace
 
-from rendergraph.errors import InputError, Problem
+from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.glsl.reachable import compiled_text
 from rendergraph.glsl.source import SourceText
 from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import FORMATS, GLSL_SHAPES, TextureDesc
@@ -25,16 +26,23 @@ rgb10_a2ui"""
 _LAYOUT_FORMATS = {*FORMATS, *_OTHER_FORMATS.split()}
 
 
-def with_formats(source: SourceText, step: Step, resources: Mapping[str, Resource]) -> SourceText:
-    """Add the port's format to every image of a compute shader that states none (RG427 if they disagree)."""
+def with_formats(
+    source: SourceText, step: Step, resources: Mapping[str, Resource], macros: Mapping[str, str]
+) -> SourceText:
+    """Add the port's format to every image that states none (RG427 if they disagree, RG430 if it is no port's)."""
     images = dict(_images(step, resources))
-    if not images:
-        return source
     lines, origins = list(source.lines), list(source.origins)
     problems: list[Problem] = []
     for number, line in enumerate(lines):
         match = _IMAGE.search(line)
-        if match is None or match["name"] not in images:
+        if match is None:
+            continue
+        if match["name"] not in images:
+            if _is_compiled(source, macros, match):
+                place = origins[number].place(match.start("name") + 1)
+                problems.append(
+                    replace(step.problem("RG430", _unknown(step, match, images)), line_text=line, place=place)
+                )
             continue
         use, desc = images[match["name"]]
         text = _mismatch(match, use, desc)
@@ -49,6 +57,19 @@ def with_formats(source: SourceText, step: Step, resources: Mapping[str, Resourc
     if problems:
         raise InputError(problems)
     return SourceText.of(zip(lines, origins, strict=True))
+
+
+def _is_compiled(source: SourceText, macros: Mapping[str, str], match: re.Match[str]) -> bool:
+    text = "".join(f"#define {name} {value}\n" for name, value in macros.items()) + source.text
+    return match["rest"] in compiled_text(text, certain=True)
+
+
+def _unknown(step: Step, match: re.Match[str], images: Collection[str]) -> str:
+    """Drivers ask for a format layout qualifier where the name is wrong."""
+    files = ", ".join(file for _, file in step.shaders)
+    text = f"{files} declares the image '{match['name']}', but the step loads and stores no port of that name"
+    hint = suggestion(match["name"], images) if images else ""
+    return text + (hint or f"; give {match['name']}=PORT.stored(), or name it in `out`")
 
 
 def _images(step: Step, resources: Mapping[str, Resource]) -> Iterator[tuple[str, tuple[Read | Write, TextureDesc]]]:

@@ -25,6 +25,7 @@ from rendergraph.textures import SIGNATURES, TEXTURE_KINDS, Signature, TextureDe
 
 VERSION = "#version 450 core"
 _EXTENSION = re.compile(r"\s*#\s*extension\b")
+_IMAGE_TYPE = re.compile(r"\buniform\s[^;]*image")
 _TEXTS: FileCache[dict[str, StageText]] = FileCache(96)
 """The texts of steps, some 100 KiB each."""
 _MANY_LAYERS = 16  # more layers than this are looked up in a loop instead of one test each
@@ -189,10 +190,10 @@ class _Program(Struct, frozen=True):
         if functions.blocks:  # which may include what it includes
             source = expanded(includes)
         uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
-        if any(use.use == "image" for use in uses):
+        if any(use.use == "image" for use in uses) or _IMAGE_TYPE.search(source.text):
             from rendergraph.program.images import with_formats  # many pipelines have no images
 
-            source = with_formats(source, step, self.resources)
+            source = with_formats(source, step, self.resources, self.macros)
         extensions, source = _hoisted(source)
         body = functions.text + source.text
         declarations = self._elements(body) + _read_declarations(step.reads, self.resources, "", body)

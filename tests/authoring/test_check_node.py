@@ -319,6 +319,15 @@ SHADERS = {
 }
 
 
+def test_a_keyword_that_no_shader_uses_is_a_warning(check: Check) -> None:
+    record = "def record(self, steps: Steps) -> None:", '    steps.fullscreen("glow.frag", gain=2.0, gian=3.0)'
+    answer = check(body(*record))
+    assert answer.code == 0
+    (said,) = answer.messages
+    line = 1 + body(*record).splitlines().index(f"        {record[1].strip()}")
+    assert said.startswith(f"glow.py:{line}:1: warning: RG455 the step is given gian=…, but no program of it uses 'gian'")
+
+
 @pytest.mark.parametrize("name", SHADERS)
 def test_a_wrong_shader_is_one_message(check: Check, name: str) -> None:
     shader, message = SHADERS[name]

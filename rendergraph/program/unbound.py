@@ -1,0 +1,98 @@
+"""What a step's shaders use and nothing provides: samplers, views, images and uniforms. No GL.
+
+As far as texts show it: a driver leaves out what a constant condition excludes, and only it knows.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Mapping
+
+from rendergraph.declare import Node
+from rendergraph.errors import Problem, suggestion
+from rendergraph.glsl.reachable import compiled_text, reachable_names
+from rendergraph.program.text import StageText, prefix
+from rendergraph.steps import Read, Step, Write
+
+_VIEWS = re.compile(r"\b([A-Za-z_]\w*)_views\b")
+_UNIFORM = re.compile(
+    r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?(?!\w*(?:sampler|image))\w+\s+([A-Za-z_][\w\s,]*)[;=\[]"
+)
+_CONSTANT_IF = re.compile(r"\bif\s*\([A-Z0-9_\s!=<>&|()+-]*[A-Z][A-Z0-9_\s!=<>&|()+-]*\)")
+
+
+def unbound_sampler(step: Step, name: str, sampled: Collection[str], cls: type[Node]) -> str:
+    """Return what is wrong with a sampler that the step binds no texture to."""
+    if name in cls.ports() and step.where.caller is not None:
+        text = f"{_files(step)} samples '{name}', a port of the node that this step does not read"
+        return f"{text}; add {name}=self.{name} to the step{_guard(cls, name)}"
+    slot = name.endswith("_texture") and step.kind == "geometry"
+    guard = f"; not every material has it, so it stands inside #ifdef HAS_{name.upper()}" if slot else ""
+    text = f"{_files(step)} samples '{name}', but the step reads no texture of that name"
+    return f"{text}; it reads {', '.join(sorted(sampled)) or 'none'}{guard}"
+
+
+def unset_uniform(step: Step, name: str) -> str:
+    """Return what is wrong with a uniform that the step gives no value."""
+    hint = suggestion(name, [known for known, _ in step.uniforms])
+    return f"{_files(step)} looks at uniform '{name}', which nothing sets{hint}"
+
+
+def unbound(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> Iterator[tuple[StageText, str, Problem]]:
+    """Yield stage, name and problem of what a step's own shaders certainly use and nothing provides.
+
+    Warnings are about what a constant condition might exclude.
+    """
+    uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
+    given = {use.name for use in uses}
+    given |= {prefix(each.node) + read.name for each in step.functions for read in each.reads}
+    set_names = {name for name, _ in step.uniforms} | {"view_index"}
+    set_names |= {prefix(each.node) + name for each in step.functions for name, _ in each.uniforms}
+    for text in texts.values():
+        blocks = [block for block in text.source.blocks if block.origin.file is not None and not block.origin.shared]
+        own = "\n".join("\n".join(block.lines) for block in blocks if not block.origin.prefix)
+        found = dict(_suspects(step, own, text.text, given, set_names, cls))
+        if not found:
+            continue
+        names = reachable_names(text.text, certain=True)
+        declared = compiled_text(text.text, certain=True)
+        for name, problem in found.items():
+            is_view = name.endswith("_views")
+            if name in names and (is_view or re.search(rf"\buniform\b[^;{{}}]*\b{name}\b", declared)):
+                yield text, name, problem if is_view or not _CONSTANT_IF.search(own) else problem.as_warning()
+
+
+def _suspects(
+    step: Step, own: str, whole: str, given: Collection[str], set_names: Collection[str], cls: type[Node]
+) -> Iterator[tuple[str, Problem]]:
+    from rendergraph.program.checks import declared_samplers
+
+    ports = cls.ports()
+    for name in declared_samplers(own).keys() - given:
+        if not (name.endswith("_texture") and step.kind == "geometry"):
+            yield name, step.problem("RG430", unbound_sampler(step, name, given, cls))
+    for stem in set(_VIEWS.findall(own)):
+        port = stem.removeprefix("previous_")
+        if port in ports and f"{stem}_view_block" not in whole:
+            yield f"{stem}_views", step.problem("RG430", _without_views(step, port, given, cls))
+    for names in _UNIFORM.findall(own):
+        for name in re.findall(r"[A-Za-z_]\w*", names):
+            if name not in set_names and name not in given:
+                yield name, step.problem("RG434", unset_uniform(step, name))
+
+
+def _without_views(step: Step, port: str, given: Collection[str], cls: type[Node]) -> str:
+    if port in given:
+        text = f"{_files(step)} looks at the views of '{port}', but that texture was not drawn with a view"
+        return f"{text}; use `camera`, or give its output `view=`"
+    text = f"{_files(step)} looks at the views of '{port}', a port of the node that this step does not read"
+    return f"{text}; add {port}=self.{port} to the step{_guard(cls, port)}"
+
+
+def _guard(cls: type[Node], name: str) -> str:
+    optional = getattr(cls.ports()[name], "optional", False)
+    return f", or leave it out by #ifdef HAS_{name.upper()} where it is not connected" if optional else ""
+
+
+def _files(step: Step) -> str:
+    return ", ".join(file for _, file in step.shaders)
