@@ -6,7 +6,8 @@ As far as texts show it: a driver leaves out what a constant condition excludes,
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from functools import partial
 
 from rendergraph.declare import Node
 from rendergraph.errors import Problem, suggestion
@@ -52,33 +53,39 @@ def unbound(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> Iter
         blocks = [block for block in text.source.blocks if block.origin.file is not None and not block.origin.shared]
         own = "\n".join("\n".join(block.lines) for block in blocks if not block.origin.prefix)
         found = dict(_suspects(step, own, text.text, given, set_names, cls))
+        if found:  # mostly in a branch that the step's macros exclude
+            macros = [line for block in text.source.blocks if block.origin.file is None for line in block.lines]
+            quick = compiled_text("\n".join([*macros, own]), certain=True)
+            found = {name: problem for name, problem in found.items() if re.search(rf"\b{name}\b", quick)}
         if not found:
             continue
         names = reachable_names(text.text, certain=True)
         declared = compiled_text(text.text, certain=True)
-        for name, problem in found.items():
+        for name, (code, describe) in found.items():
             is_view = name.endswith("_views")
             if name in names and (is_view or re.search(rf"\buniform\b[^;{{}}]*\b{name}\b", declared)):
-                yield text, name, problem if is_view or not _CONSTANT_IF.search(own) else problem.as_warning()
+                one = step.problem(code, describe())
+                yield text, name, one if is_view or not _CONSTANT_IF.search(own) else one.as_warning()
 
 
 def _suspects(
     step: Step, own: str, whole: str, given: Collection[str], set_names: Collection[str], cls: type[Node]
-) -> Iterator[tuple[str, Problem]]:
+) -> Iterator[tuple[str, tuple[str, Callable[[], str]]]]:
+    """Yield names, with the code of the problem and what returns its text."""
     from rendergraph.program.checks import declared_samplers
 
     ports = cls.ports()
     for name in declared_samplers(own).keys() - given:
         if not (name.endswith("_texture") and step.kind == "geometry"):
-            yield name, step.problem("RG430", unbound_sampler(step, name, given, cls))
+            yield name, ("RG430", partial(unbound_sampler, step, name, given, cls))
     for stem in set(_VIEWS.findall(own)):
         port = stem.removeprefix("previous_")
         if port in ports and f"{stem}_view_block" not in whole:
-            yield f"{stem}_views", step.problem("RG430", _without_views(step, port, given, cls))
+            yield f"{stem}_views", ("RG430", partial(_without_views, step, port, given, cls))
     for names in _UNIFORM.findall(own):
         for name in re.findall(r"[A-Za-z_]\w*", names):
             if name not in set_names and name not in given:
-                yield name, step.problem("RG434", unset_uniform(step, name))
+                yield name, ("RG434", partial(unset_uniform, step, name))
 
 
 def _without_views(step: Step, port: str, given: Collection[str], cls: type[Node]) -> str:

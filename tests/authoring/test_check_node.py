@@ -325,7 +325,9 @@ def test_a_keyword_that_no_shader_uses_is_a_warning(check: Check) -> None:
     assert answer.code == 0
     (said,) = answer.messages
     line = 1 + body(*record).splitlines().index(f"        {record[1].strip()}")
-    assert said.startswith(f"glow.py:{line}:1: warning: RG455 the step is given gian=…, but no program of it uses 'gian'")
+    assert said.startswith(
+        f"glow.py:{line}:1: warning: RG455 the step is given gian=…, but no program of it uses 'gian'"
+    )
 
 
 @pytest.mark.parametrize("name", SHADERS)
