@@ -167,21 +167,24 @@ def _pipeline_text(entry: Entry) -> str:
     )
 
 
-_MOST_OBJECTS = 40
+_MOST_ENTRIES = 40
 
 
 def _scene_text(entry: Entry) -> str:
-    objects = [
+    def listed(title: str, rows: list[tuple[Any, ...]], *columns: Any, **options: Any) -> str:
+        """A section with the first rows, and the number of the others."""
+        more = len(rows) - _MOST_ENTRIES
+        return section(title, rows[:_MOST_ENTRIES], *columns, **options) + (f"\n  and {more} more" if more > 0 else "")
+
+    objects: list[tuple[Any, ...]] = [
         (one["name"], one["triangles"], one["material"], "" if one["casts_shadow"] else "casts no shadow")
-        for one in entry["objects"][:_MOST_OBJECTS]
+        for one in entry["objects"]
     ]
-    more = len(entry["objects"]) - len(objects)
-    listing = section("Objects", objects, ("name", "triangles", "material", ""), right=(1,))
     return sections(
         f"{entry['scene']}  (scene, {entry['triangles']} triangles{', animated' if entry['moves'] else ''})",
         entry["line"],
-        listing + (f"\n  and {more} more" if more else ""),
-        section("Lights", [(one["name"], one["line"]) for one in entry["lights"]]),
+        listed("Objects", objects, ("name", "triangles", "material", ""), right=(1,)),
+        listed("Lights", [(one["name"], one["line"]) for one in entry["lights"]]),
         section("Cameras", [(one["name"], one["line"]) for one in entry["cameras"]]),
         *entry["added"],
         f"`rendergraph run forward --scene {entry['name']}` renders it.",

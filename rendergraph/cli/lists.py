@@ -68,7 +68,7 @@ def nodes(family: str | None, plugins: tuple[Path, ...], as_json: bool) -> None:
     """List the node types, all or of one family.
 
     `rendergraph explain NODE` describes a node. Other things that plugins add come last: port types, parameter choices,
-    loaders, metrics. Node types with errors are left out with a warning, and the exit code is 3.
+    loaders, metrics, keys of scene files. Node types with errors are left out with a warning, and the exit code is 3.
 
     \b
     Examples:

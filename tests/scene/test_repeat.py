@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
 import math
+import random
 import time
 from pathlib import Path
 from typing import Any
@@ -12,13 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rendergraph.cli import main
 from rendergraph.errors import InputError
 from rendergraph.keys import file_schema
 from rendergraph.scene import animate, pack
 from rendergraph.scene.geometry import euler_matrix
 from rendergraph.scene.load import load
 from rendergraph.scene.model import Scene, SceneLimits
-from rendergraph.scene.repeat import _random
+from rendergraph.scene.repeat import _random, read_columns
 from rendergraph.scene.scene_keys import SCENE
 
 
@@ -305,6 +308,28 @@ def test_an_archive_that_unpacks_to_too_much(tmp_path: Path) -> None:
     limits = SceneLimits(memory_bytes=1_000_000)
     with pytest.raises(InputError, match=r"'a\.npz' unpacks to 2,400,\d+ bytes, more than 1,000,000"):
         read(tmp_path, "lights: {l: {type: point, repeat: {file: a.npz}}}", limits=limits)
+
+
+def test_mutilated_files_are_mistakes_and_nothing_worse(tmp_path: Path) -> None:
+    as_npz(tmp_path / "a.npz")
+    sources = {".npz": (tmp_path / "a.npz").read_bytes(), ".csv": CSV.encode(), ".json": b'{"at": [[1, 2, 3]]}'}
+    choose = random.Random(3)
+    for ending, source in 150 * [*sources.items()]:
+        data = bytearray(source)
+        for _ in range(choose.randint(1, 5)):
+            at = choose.randrange(len(data) + 1)
+            data[at : at + choose.choice((0, 1, 9))] = choose.randbytes(choose.choice((0, 1, 4)))
+        with contextlib.suppress(ValueError):
+            read_columns(bytes(data), ending, "lights", 1000, 1 << 20)
+
+
+def test_explain_lists_the_first_of_many(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lamps(tmp_path, "line: 500")
+    assert main(["explain", str(tmp_path / "a.yaml")]) == 0
+    printed = capsys.readouterr().out
+    assert "lamp.39 " in printed
+    assert "lamp.40" not in printed
+    assert "and 460 more" in printed
 
 
 def test_the_schema_knows_each_way_to_repeat() -> None:
