@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import math
-import zipfile
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -33,8 +30,6 @@ _CSV = {
     **{name: (name, 0) for name in ("scale", "intensity", "range")},
 }
 """The columns of a table in text, with the key and the number within it."""
-_BROKEN = (ValueError, OSError, EOFError, KeyError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)
-"""What NumPy raises for a broken file."""
 _RANDOM = ("at", "rotate_degrees", "scale", "color", "intensity", "choose")
 """What is varied. Each has random numbers of its own, so that one more does not change the others."""
 
@@ -237,6 +232,8 @@ def _column(key: str, values: object, width: int) -> Doubles:
 
 
 def _csv_columns(data: bytes, section: str, most: int) -> dict[str, Any]:
+    import csv  # for such files alone
+
     rows = csv.reader(io.StringIO(data.decode("utf-8-sig", "replace")))
     try:
         header = [name.strip() for name in next(rows, [])]
@@ -272,21 +269,16 @@ def _csv_columns(data: bytes, section: str, most: int) -> dict[str, Any]:
 
 
 def _arrays(data: bytes, most_bytes: int) -> dict[str, Any]:
+    import zipfile  # for such files alone
+    import zlib
+
+    broken = (ValueError, OSError, EOFError, KeyError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             unpacked = sum(entry.file_size for entry in archive.infolist())
         if unpacked <= most_bytes:
             with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
                 return {str(key): arrays[key] for key in arrays.files}
-    except (
-        ValueError,
-        OSError,
-        EOFError,
-        KeyError,
-        zipfile.BadZipFile,
-        zlib.error,
-        RuntimeError,
-        MemoryError,
-    ) as error:
+    except broken as error:
         raise ValueError(f"is not a file of NumPy arrays: {error}") from None
     raise ValueError(f"unpacks to {unpacked:,} bytes, more than {most_bytes:,}")
