@@ -234,37 +234,28 @@ def _column(key: str, values: object, width: int) -> Doubles:
 def _csv_columns(data: bytes, section: str, most: int) -> dict[str, Any]:
     import csv  # for such files alone
 
+    columns = {name: target for name, target in _CSV.items() if target[0] in COLUMNS[section]}
+    numbers: list[list[float]] = []
     rows = csv.reader(io.StringIO(data.decode("utf-8-sig", "replace")))
     try:
         header = [name.strip() for name in next(rows, [])]
-        columns = {name: target for name, target in _CSV.items() if target[0] in COLUMNS[section]}
-        for name in header:
-            if name not in columns:
-                raise ValueError(f"has the column '{name}'{suggestion(name, columns, most=len(columns))}")
-        if len({*header}) < len(header):
-            raise ValueError("has a column twice")
-        numbers: list[list[float]] = []
-        for row in rows:
-            if not row:
-                continue
+        if wrong := [name for name in header if name not in columns or header.count(name) > 1]:
+            hint = suggestion(wrong[0], columns, most=len(columns))
+            raise ValueError(f"'{wrong[0]}' is no column, or there twice{hint}")
+        for row in filter(None, rows):
             if len(row) != len(header) or len(numbers) >= most:
-                problem = f"{len(row)} values, not {len(header)}" if len(row) != len(header) else "too many rows"
-                raise ValueError(f"has {problem} in line {rows.line_num}")
-            try:
-                numbers.append([float(value) for value in row])
-            except ValueError:
-                raise ValueError(f"has text in place of a number in line {rows.line_num}") from None
-    except csv.Error as error:
-        raise ValueError(f"is broken: {error}") from None
+                raise ValueError(
+                    "too many rows" if len(row) == len(header) else f"{len(row)} values, not {len(header)}"
+                )
+            numbers.append([float(value) for value in row])
+    except (csv.Error, ValueError) as error:
+        raise ValueError(f"has a mistake in line {rows.line_num}: {error}") from None
     array = np.array(numbers, np.float64).reshape(len(numbers), len(header))
     found: dict[str, Any] = {}
-    for key in dict.fromkeys(columns[name][0] for name in header):
-        width = COLUMNS[section][key]
-        default = 1.0 if key == "color" else 0.0
-        found[key] = np.full((len(array), width), default)
-        for name in header:
-            if columns[name][0] == key:
-                found[key][:, columns[name][1]] = array[:, header.index(name)]
+    for number, name in enumerate(header):
+        key, channel = columns[name]
+        blank = np.full((len(array), COLUMNS[section][key]), 1.0 if key == "color" else 0.0)
+        found.setdefault(key, blank)[:, channel] = array[:, number]
     return found
 
 

@@ -257,17 +257,17 @@ def _few() -> SceneLimits:
 
 
 BROKEN = {
-    "a,b\n1,2": "has the column 'a'; available: b, g, intensity",
-    "x,y,x\n1,2,3": "has a column twice",
-    "x,y,z\n1,2": "has 2 values, not 3 in line 2",
-    "x,y,z\n1,2,up": "has text in place of a number in line 2",
+    "a,b\n1,2": "has a mistake in line 1: 'a' is no column, or there twice; available: b, g, intensity",
+    "x,y,x\n1,2,3": "has a mistake in line 1: 'x' is no column, or there twice",
+    "x,y,z\n1,2": "has a mistake in line 2: 2 values, not 3",
+    "x,y,z\n1,2,up": "has a mistake in line 2: could not convert string to float: 'up'",
     "x,y,z\n\n1,2,nan": "has 'at' [1.0, 2.0, nan] in row 1; it must be finite",
     "x,y,z": "has no rows",
     "": "has no rows",
     "intensity\n-1": "has 'intensity' [-1.0] in row 1; it must be at least 0",
     "range\n0": "has 'range' [0.0] in row 1; it must be above 0",
-    "x,scale\n1,2": "has the column 'scale'",
-    "x\n1\n2\n3\n4\n5\n6\n7": "has too many rows in line 7",
+    "x,scale\n1,2": "has a mistake in line 1: 'scale' is no column",
+    "x\n1\n2\n3\n4\n5\n6\n7": "has a mistake in line 7: too many rows",
 }
 
 
