@@ -204,7 +204,7 @@ class SceneDataFacts(Struct, frozen=True):
     """What inputs of `SceneData` bring along.
 
     Attributes:
-        bytes: of all buffers and texture arrays, without the blocks of lights and materials that every scene has.
+        bytes: of buffers and texture arrays, without the indices, lights and materials that every scene has.
         triangles: of all objects.
         emitters: triangles that emit light in some frame, of objects that are not hidden.
         textures: the arrays that hold the materials' textures.

@@ -169,7 +169,8 @@ class GpuScene(Struct, eq=False, dict=True):
             used = used_textures(self.scene)
             self.load_images(list(used.values()))
             images = {key: self._images[texture.image, texture.srgb] for key, texture in used.items()}
-            self._data = SceneBuffers.make(self.device, self.scene, self.packed, images)
+            indices = self._indices["triangles"].buffer
+            self._data = SceneBuffers.make(self.device, self.scene, self.packed, indices, images)
         return self._data
 
     @property

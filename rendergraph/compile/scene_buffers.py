@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
 
+from rendergraph.errors import Problem, RenderError
 from rendergraph.gl import textures
 from rendergraph.gl.device import Device
 from rendergraph.gl.textures import GpuTexture
@@ -26,7 +27,7 @@ class SceneBuffers(Struct, eq=False):
     """The scene's data on the GPU.
 
     Attributes:
-        buffers: storage buffers by the names of their blocks in `scene.glsl`.
+        buffers: storage buffers by the names of their blocks in `scene.glsl`; the indices are those of geometry passes.
         instances: the records that the instance buffer holds.
         arrays: where textures lie.
         textures: texture arrays by their names in `scene.glsl`; they all have one `sampler`.
@@ -41,31 +42,42 @@ class SceneBuffers(Struct, eq=False):
 
     @classmethod
     def make(
-        cls, device: Device, scene: Scene, packed: PackedScene, images: Mapping[Stored, GpuTexture]
+        cls,
+        device: Device,
+        scene: Scene,
+        packed: PackedScene,
+        indices: moderngl.Buffer,
+        images: Mapping[Stored, GpuTexture],
     ) -> SceneBuffers:
-        """Upload all buffers of a scene, and copy its images, which have been uploaded, into arrays."""
+        """Upload what a scene has not on the GPU yet, and copy its images, which have been uploaded, into arrays."""
         instances = scene_data.instance_data(scene, packed)
         found = scene_data.texture_arrays({key: image.desc for key, image in images.items()})
         sizes = {key: image.desc.size for key, image in images.items()}
         arrays: dict[str, npt.NDArray[np.generic]] = {
             "scene_vertex_block": scene_data.vertex_data(packed),
-            "scene_index_block": packed.indices,
             "scene_instance_block": instances,
             "scene_emitter_block": scene_data.emitter_data(scene, packed),
             "scene_texture_block": scene_data.texture_data(scene, sizes, found),
         }
+        most = device.limits["storage_block"]
+        for name, array in arrays.items():
+            if array.nbytes > most:
+                text = f"the scene's '{name}' takes {array.nbytes} bytes, a storage block of this device holds {most}"
+                raise RenderError(Problem("RG435", text))
         buffers = {name: device.ctx.buffer(array.tobytes() or bytes(128)) for name, array in arrays.items()}
+        buffers["scene_index_block"] = indices
         made = {
             f"{ARRAY}{number}": textures.create(device, desc, "an array of the scene's textures")
             for number, desc in enumerate(found.arrays)
         }
-        for key, (array, layer) in found.places.items():
-            _copy_with_border(device, images[key], made[f"{ARRAY}{array}"], layer, key)
+        for key, (number, layer) in found.places.items():
+            _copy_with_border(device, images[key], made[f"{ARRAY}{number}"], layer, key)
         return cls(device, buffers, instances, found, made, textures.create_sampler(device, Sampler("linear")))
 
     def release(self) -> None:
-        for buffer in self.buffers.values():
-            buffer.release()
+        for name, buffer in self.buffers.items():
+            if name != "scene_index_block":
+                buffer.release()
         for texture in self.textures.values():
             textures.delete(self.device, texture)
         self.device.raw.delete("glDeleteSamplers", self.sampler)

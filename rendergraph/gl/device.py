@@ -240,6 +240,7 @@ def _wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
         "color_targets": min(raw.integer(0x8CDF), raw.integer(0x8824)),  # attachments, draw buffers
         "images": raw.integer(0x8F38),
         "storage_bindings": raw.integer(0x90DD),
+        "storage_block": raw.integer(0x90DE),
         "vertex_storage": raw.integer(0x90D6),  # blocks
         "geometry_storage": raw.integer(0x90D7),
         "fragment_storage": raw.integer(0x90DA),

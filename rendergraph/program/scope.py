@@ -103,6 +103,7 @@ class _Scope:
             if name not in textures:
                 where = "the step's view" if name == "view_index" else "nothing in this step, which has no use for it"
                 where = "the scene's materials, where they have one" if name in _OF_MATERIALS else where
+                where = "the scene's textures" if name.startswith("scene_array_") else where
                 where = f"input '{name}', not connected" if name in inputs else where
                 section = "textures" if "sampler" in declaration.type or "image" in declaration.type else "uniforms"
                 yield InScope(section, f"uniform {_type(declaration)} {name}", where)

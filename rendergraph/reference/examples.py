@@ -36,7 +36,7 @@ def example_text(node_type: NodeType, catalog: Catalog) -> str:
     links, groups = {}, node_type.cls.groups()
     for name, port in node_type.cls.inputs().items():
         group = next((group for group, members in groups.items() if name in members), None)
-        if not port.optional:
+        if not port.optional and not getattr(port, "takes_scene", False):
             links[group or name] = "NODE" if group else f"NODE.{name}"
     inputs = f", inputs: {_flow(links)}" if links else ""
     return f"{node_type.word}: {{type: {node_type.name}{inputs}}}"
@@ -126,7 +126,7 @@ def _links(node_type: NodeType, base: Graph, optional: set[str]) -> Links | None
             end = next((node.id for node in base.nodes if set(groups[group]) <= node.type.cls.outputs().keys()), None)
         if end:
             links[group or name] = end
-        elif not port.optional:
+        elif not port.optional and not getattr(port, "takes_scene", False):
             return None
     return links
 

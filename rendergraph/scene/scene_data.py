@@ -130,14 +130,12 @@ def texture_data(scene: Scene, sizes: Mapping[Stored, tuple[int, int]], arrays: 
 
 def scene_data_facts(scene: Scene) -> SceneDataFacts:
     """Return what inputs of `SceneData` bring along in this scene."""
-    corners = sum(len(mesh.indices) for mesh in scene.meshes)
     vertices = sum(len(mesh.positions) for mesh in scene.meshes)
     width = 6 + sum(size for name, size in _OPTIONAL.items() if any(getattr(m, name) is not None for m in scene.meshes))
     emitters = sum(len(scene.meshes[scene.objects[number].mesh].indices) for number in emitting_objects(scene))
     textures = expected_arrays(scene)
     return SceneDataFacts(
         bytes=4 * width * vertices
-        + 12 * corners
         + INSTANCE_DATA.itemsize * len(scene.objects)
         + EMITTER.itemsize * emitters
         + 16 * len(SLOTS) * len(scene.materials) * bool(textures.arrays)

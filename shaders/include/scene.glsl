@@ -296,9 +296,8 @@ float scene_alpha(int instance, int triangle, vec2 barycentrics) {
 
 // As `tangent_frame()` of `fragment_surface.glsl`: the mesh's own tangents, else along the texture coordinates of the
 // normal map. `v`, `w` and `corners` are the triangle's vertices, their weights and their world-space positions.
-// `is_front`: the triangle turns counter-clockwise for the viewer.
 void scene_tangent_frame(
-    int instance, ivec3 v, vec3 w, mat3 corners, bool is_front, vec3 normal, out vec3 tangent, out vec3 bitangent) {
+    int instance, ivec3 v, vec3 w, mat3 corners, vec3 normal, out vec3 tangent, out vec3 bitangent) {
 #ifdef SCENE_TANGENTS_STREAM
     if (scene_has(instance, SCENE_HAS_TANGENTS)) {
         vec4 local =
@@ -312,13 +311,10 @@ void scene_tangent_frame(
 #ifdef SCENE_NORMAL_ARRAYS
     set = scene_textures[MATERIAL_INDEX(scene_instances[instance].material) * 8 + NORMAL_SLOT].w & 1;
 #endif
-    vec3 a = corners[1] - corners[0], b = corners[2] - corners[0];
-    vec2 uv0 = scene_vertex_uv(v.x, set), uv_a = scene_vertex_uv(v.y, set) - uv0, uv_b = scene_vertex_uv(v.z, set) - uv0;
-    if (is_front) {
-        uv_tangent_frame(normal, a, b, uv_a, uv_b, tangent, bitangent);
-    } else {
-        uv_tangent_frame(normal, b, a, uv_b, uv_a, tangent, bitangent);
-    }
+    vec2 uv = scene_vertex_uv(v.x, set);
+    vec2 uv_a = scene_vertex_uv(v.y, set) - uv, uv_b = scene_vertex_uv(v.z, set) - uv;
+    uv_tangent_frame(
+        normal, corners[1] - corners[0], corners[2] - corners[0], uv_a, uv_b, tangent, bitangent);
 }
 
 // Everything a shading model reads: the surface that a geometry pass shades there, seen along -view_dir. Nothing is
@@ -383,8 +379,7 @@ Surface scene_surface(int instance, int triangle, vec2 barycentrics, vec3 view_d
 #else
     bool needs_frame = texels.has_normal;
 #endif
-    bool turns = is_front != ((flags & SCENE_MIRRORED) != 0);  // counter-clockwise for the viewer
-    if (needs_frame) scene_tangent_frame(instance, v, w, corners, turns, s.normal, s.tangent, s.bitangent);
+    if (needs_frame) scene_tangent_frame(instance, v, w, corners, s.normal, s.tangent, s.bitangent);
     bool flip_normal = !is_front && (flags & SCENE_DOUBLE_SIDED) != 0;
     material_surface(s, m, texels, flip_normal, (flags & SCENE_UNLIT) == 0);
     return s;

@@ -11,6 +11,7 @@ from rendergraph.compile import gpu_scene
 from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.scene import pack
 from rendergraph.scene.model import Material, Mesh, Object, Scene
+from rendergraph.scene.scene_data import instance_data
 
 if TYPE_CHECKING:
     import pytest
@@ -41,7 +42,7 @@ def test_only_records_of_what_has_moved_are_written(gl: Any, monkeypatch: pytest
     monkeypatch.setattr(gpu_scene, "write_records", count)
     with gl.device.current():
         made = GpuScene(gl.device, scene, pack.pack(scene), None, None)  # type: ignore[arg-type]  # it has no images
-        before = made.previous()
+        before, data = made.previous(), made.data
         for moving in (0, 1, 2, 80, 1, 0, 0, 3):  # 80 of 100 are too many runs to be written one by one
             was = made.packed.instances.tobytes()
             made.advance()
@@ -52,5 +53,7 @@ def test_only_records_of_what_has_moved_are_written(gl: Any, monkeypatch: pytest
             made.update(scene)
             assert made._instances.read() == made.packed.instances.tobytes() == pack.pack(scene).instances.tobytes()
             assert before.read() == was
+            records = instance_data(scene, pack.pack(scene))
+            assert data.buffers["scene_instance_block"].read() == records.tobytes()
         made.release(gl.cache.programs)
-    assert written == [1, 1, 2, 2, 80, 80, 1, 1, 3]
+    assert written == [1, 1, 1, 2, 2, 2, 80, 80, 80, 1, 1, 1, 3, 3]  # both buffers, then that of the frame before

@@ -17,6 +17,7 @@ from rendergraph.api import Any as Anything
 from rendergraph.api import DisplayColor, Function, Input, Node, Output, SceneData, ShadowLookup, Steps
 from rendergraph.compile import GpuScene
 from rendergraph.errors import InputError, RenderError
+from rendergraph.images import write
 from rendergraph.scene import scene_data
 from rendergraph.scene.model import ImageSource, Texture
 from rendergraph.textures import TextureDesc
@@ -192,6 +193,73 @@ def test_a_surface_is_what_a_geometry_pass_draws(gl: rg.Session, plugins: Path, 
     assert max(values.max(initial=0.0) for values in differences(frame).values()) < 5e-4  # of factors alone
 
 
+PATCH = """
+v -1 0 -1
+v 1 0.2 -1
+v 1 0 1
+v -1 0.3 1
+vt -0.6 -0.4
+vt 1.7 0.1
+vt 1.4 2.3
+vt -0.2 1.6
+vn 0 1 0.1
+vn 0.1 1 0
+vn 0 1 -0.1
+vn -0.1 1 0
+f 1/1/1 4/4/4 3/3/3
+f 1/1/1 3/3/3 2/2/2
+"""
+TEXTURED = """
+scene: 1
+cameras: {main: {eye: [0.2, 3.2, 4.2], target: [0, 0, -0.2], fov_y_degrees: 55}}
+lights: {sun: {type: directional}}
+materials:
+  all:
+    base_color_texture: color.png
+    metallic_roughness_texture: other.png
+    occlusion_texture: other.png
+    normal_texture: bumps.png
+    emissive_texture: color.png
+    emissive: [1, 2, 3]
+    metallic: 0.8
+    normal_scale: 1.5
+    occlusion_strength: 0.7
+    double_sided: true
+  masked: {base_color_texture: color.png, alpha_mode: mask, alpha_cutoff: 0.48, double_sided: true, normal_texture: bumps.png}
+  grain: {anisotropy_strength: 0.5, anisotropy_rotation: 0.4, base_color: [0.2, 0.4, 0.6], normal_texture: bumps.png}
+objects:
+  plain: {file: patch.obj, material: all, at: [-2.2, 0, 0]}
+  mirrored: {file: patch.obj, material: all, at: [0, 0.5, 0], scale: [-1, 1.5, 0.7], rotate_degrees: [20, 30, 0]}
+  below: {file: patch.obj, material: all, at: [2.2, 0.5, 0], rotate_degrees: [195, 20, 0]}
+  both: {file: patch.obj, material: masked, at: [-1.5, 1.6, -1.5], scale: [1.5, 1, -1.5], rotate_degrees: [70, 10, 0]}
+  knot: {shape: torus_knot, material: grain, at: [1.5, 1.2, -1], scale: [1.1, -1.2, 1.4]}
+  stretched: {shape: sphere, material: all, at: [0, 0, 2], scale: [0.8, 0.3, 0.5], rotate_degrees: [0, 0, 30]}
+"""
+
+
+@pytest.mark.usefixtures("level_0")
+def test_every_use_of_textures_and_transforms_is_the_same(gl: rg.Session, plugins: Path, tmp_path: Path) -> None:
+    """Both sides, mirrored and stretched; tangents of the mesh and derived ones; masks, grain, wrapped coordinates."""
+    pytest.importorskip("OpenImageIO")
+    random = np.random.default_rng(3)
+    images = {"color": (5, 7), "other": (8, 4), "bumps": (16, 16)}
+    for name, size in images.items():
+        texels = random.integers(90, 166, (*size, 4 if name == "color" else 3))
+        if name == "bumps":
+            texels[..., 2] = 255
+        write(tmp_path / f"{name}.png", texels.astype(np.uint8))
+    (tmp_path / "patch.obj").write_text(PATCH)
+    (tmp_path / "scene.yaml").write_text(TEXTURED)
+    frame = surfaces(gl, plugins, tmp_path / "scene.yaml")
+    check(frame)
+    flags = {int(value) for value in frame["flags"][..., 2].ravel()}
+    for name in ("double_sided", "masked", "mirrored", "has_tangents", "has_uv0"):
+        bit = scene_data.FLAGS[name]
+        assert {bool(value & bit) for value in flags if value} == {True, False} or name == "has_uv0"
+    seen, drawn = frame["geometric"][..., 3], frame["drawn"][..., 3]
+    assert ((seen < 0) & (drawn == 0)).mean() > 0.03  # back faces
+
+
 SMALL = ("BoxTextured.glb", "TextureTransformTest/TextureTransformTest.gltf", "TwoSidedPlane/TwoSidedPlane.gltf")
 
 
@@ -342,7 +410,11 @@ def test_facts_know_the_bytes_and_only_readers_pay(bench: Any) -> None:
         assert bench.session.compile(plain).scene._data is None
     with bench.session.current():
         data = bench.session.compile(pipeline).scene.data
-        held = sum(buffer.size for name, buffer in data.buffers.items() if name != "scene_texture_block")
+        held = sum(
+            buffer.size
+            for name, buffer in data.buffers.items()
+            if name not in ("scene_texture_block", "scene_index_block")
+        )
     facts, size, connected = noted[0]
     assert connected
     assert facts.bytes == size == held
@@ -351,8 +423,14 @@ def test_facts_know_the_bytes_and_only_readers_pay(bench: Any) -> None:
 
 def test_a_plan_says_what_the_data_consists_of(bench: Any) -> None:
     planned = bench.pipeline(ONE, Of, shaders={"of.frag": PLACE}, scene=BOXES).plan()
-    assert planned.reasons["the scene's data"].startswith("1.9 KiB of buffers; it is uploaded with the scene")
+    assert planned.reasons["the scene's data"].startswith("1.7 KiB of buffers; it is uploaded with the scene")
     assert planned.memory.no_reuse_bytes == 16  # nothing of it is the pipeline's
+
+
+def test_a_scene_beyond_the_devices_storage_blocks_is_refused(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(bench.session.device.limits, "storage_block", 1000)
+    with pytest.raises(RenderError, match=r"RG435 the scene's 'scene_vertex_block' takes \d+ bytes"):
+        bench.draw(ONE, Of, shaders={"of.frag": PLACE}, scene=BOXES)
 
 
 def _image(number: int) -> scene_data.Stored:
