@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import threading
 from collections.abc import Iterator
@@ -53,6 +54,11 @@ class Gpu:
     def __exit__(self, *error: object) -> None:
         self.close()
 
+    @property
+    def is_usable(self) -> bool:
+        """Whether this process may render with it."""
+        return not (self._closed or os.getpid() != self._process or self.device.is_released)
+
     def close(self) -> None:
         """Free everything, the context too unless it was borrowed; only the thread that created it may do so."""
         if self._closed:
@@ -90,6 +96,27 @@ class Gpu:
             raise RenderError(Problem("RG615", text))
         with self.device.current():
             yield
+
+
+class _Contexts(dict[int | None, Gpu]):
+    """The contexts of one thread's calls without a session, by device."""
+
+    def __del__(self) -> None:  # the thread ends: nobody else may free what belongs to it
+        for gpu in self.values():
+            with contextlib.suppress(Exception):
+                gpu.close()
+
+
+_LOCAL = threading.local()
+
+
+def shared(device: int | None) -> Gpu:
+    """Return this thread's `Gpu` for calls without a session; it is closed when the thread ends."""
+    contexts: _Contexts = vars(_LOCAL).setdefault("contexts", _Contexts())
+    gpu = contexts.get(device)
+    if gpu is None or not gpu.is_usable:
+        gpu = contexts[device] = Gpu(device)
+    return gpu
 
 
 @contextmanager

@@ -164,7 +164,7 @@ class Pipeline:
 
         Args:
             size: width and height in pixels; the file's by default.
-            session: where to render; a private session by default.
+            session: where to render; by default one that all calls of a thread share.
             device: GL device number where no session is given.
             progress: a function that receives how many frames are done, and of how many; True shows a bar on stderr.
             options: the fields of `RenderOptions`.
@@ -174,11 +174,11 @@ class Pipeline:
             RenderError: rendering failed.
             DeviceError: there is no usable GL device.
         """
-        from rendergraph.session.gpu import opened
+        from rendergraph.session.gpu import shared
 
         expanded = (self if size is None else self.with_size(size)).expand(**options)
-        with opened(session, device) as gpu, report_progress(progress, "frames") as tell:
-            return stages.draw_last(expanded, gpu, tell)
+        with report_progress(progress, "frames") as tell:
+            return stages.draw_last(expanded, session or shared(device), tell)
 
     def frames(
         self,
