@@ -86,13 +86,13 @@ def test_what_is_broken_is_left_out_of_lists_with_a_warning(cli: Any, plugin: Pa
 def test_compare_shows_a_plugins_metric(cli: Any, plugin: Path, tmp_path: Path) -> None:
     words = ("compare", "forward", "shading-unlit", *SMALL, "--plugin", str(plugin))
     result = cli(*words, "-o", "report.html")
-    heads, first, second = (row.split() for row in result.out.splitlines()[1:4])
-    assert heads[:5] == ["FLIP", "RMSE", "PSNR", "SSIM", "darker"]
-    assert (first[5], second[0]) == ("0", "shading-unlit")
+    heads, first, second = (row.replace("rel. ", "").split() for row in result.out.splitlines()[1:4])
+    assert heads[:6] == ["FLIP", "RMSE", "MSE", "PSNR", "SSIM", "darker"]
+    assert (first[6], second[0]) == ("0", "shading-unlit")
     told = cli(*words, "--json").json["variants"]
     assert told[0]["plugin_metrics"] == {"darker": 0}
     assert 0 < told[1]["plugin_metrics"]["darker"] < 1
-    assert second[5] == f"{told[1]['plugin_metrics']['darker']:.4g}"
+    assert second[6] == f"{told[1]['plugin_metrics']['darker']:.4g}"
     assert ">darker</th>" in (tmp_path / "report.html").read_text()
     beyond = cli(*words, "--fail-above", "darker=0.0001")
     assert beyond.code == 4

@@ -238,7 +238,7 @@ def test_the_program_of_a_type_and_of_a_node(cli: Any) -> None:
     shown = cli("explain", "tonemap", "--glsl")
     assert shown.code == 0
     assert shown.out.startswith("// step 0 of node 'display' (tonemap) in pipeline 'forward'")
-    assert "//   uniform float exposure  parameter 'exposure': 0" in shown.out
+    assert re.search(r"//   uniform float exposure +parameter 'exposure': 0\n", shown.out)
     assert "// ==================== fragment shader\n\n#version 450 core\n" in shown.out
     told = cli("explain", "display", "--glsl", "--pipeline", "forward", "-s", "display.exposure=2", "--json").json
     assert {"section": "uniforms", "name": "uniform float exposure", "source": "parameter 'exposure': 2"} in told[
