@@ -40,6 +40,7 @@ from rendergraph.program import (
     check_kept_text,
     check_scene_includes,
     declared_blocks,
+    missing,
     positions_macro,
 )
 from rendergraph.program.limits import check_plan, groups_of
@@ -376,9 +377,9 @@ class _Compiler(Struct, eq=False, dict=True):
                 storage += 1
         try:
             program = self.programs.get(texts(), blocks, outputs)
-        except InputError:  # the driver only knows that names are missing
+        except InputError as error:  # the driver only knows that names are missing
             check_scene_includes(step, texts(), self.types)
-            raise
+            raise InputError(missing(step, texts(), self.types[step.node].cls) or error.problems) from error
         for name in before_views.keys() & program.block_names:
             self.views.keep_previous(before_views[name])
         binds: list[Call] = buffers

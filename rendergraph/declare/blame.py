@@ -13,7 +13,8 @@ from types import FrameType
 from typing import Any
 
 from rendergraph.declare.node import Node
-from rendergraph.errors import Misuse, Place, Problem, is_framework, is_interruption, nearest, shown_file, suggestion
+from rendergraph.errors import Misuse, Place, Problem, is_framework, is_interruption, shown_file, suggestion
+from rendergraph.ports import Port
 
 
 def source_location(error: BaseException, *own: Path | str) -> Place | None:
@@ -138,9 +139,10 @@ def _attribute_hint(error: BaseException) -> str:
     cls = type(error.obj)
     if issubclass(cls, Node):  # its declarations only, without methods of the base class
         return suggestion(error.name, [*cls.ports(), *cls.parameters()], most=99)
-    names = [name for name in dir(cls) if not name.startswith("_")] if is_framework(cls.__module__) else []
-    near = nearest(error.name, names)
-    return f"; did you mean '{near}'?" if near is not None else ""
+    if error.name == "previous" and issubclass(cls, Port):
+        return "; declare it as `History` to read last frame's value"
+    names = {*dir(cls), *get_annotations(cls)} if is_framework(cls.__module__) else set()
+    return suggestion(error.name, [name for name in names if not name.startswith("_")])
 
 
 def cause_chain(error: BaseException) -> Iterator[BaseException]:

@@ -90,6 +90,9 @@ class Checker(Struct, eq=False):
         whole = texel.family in ("uint", "int") and not port.compare
         if whole and port.wrap == "border":  # its value is a float
             return "has a border, so no whole numbers"
+        named = isinstance(port.semantic, Semantic) and port.semantic.name != "any"
+        if whole and named and draft.type.cls.__module__.startswith("rendergraph."):  # as shipped shaders declare it
+            return "reads no whole numbers"
         filtered = whole and self.infer.sampler(draft, port).filter != "nearest"
         return "is filtered, so no whole numbers" if filtered else ""
 

@@ -19,6 +19,7 @@ from rendergraph.program.checks import check_kept_text as check_kept_text
 from rendergraph.program.checks import check_scene_includes as check_scene_includes
 from rendergraph.program.checks import check_texts as check_texts
 from rendergraph.program.checks import declared_blocks as declared_blocks
+from rendergraph.program.checks import missing as missing
 from rendergraph.program.checks import named_reads as named_reads
 from rendergraph.program.checks import unfit_outputs as unfit_outputs
 from rendergraph.program.checks import unfit_sampler as unfit_sampler

@@ -14,7 +14,7 @@ from rendergraph.glsl.globals import globals_of
 from rendergraph.glsl.names import declarators, head, statements, tokens, without_directives
 from rendergraph.glsl.reachable import reachable_names
 from rendergraph.program.text import StageText, prefix, stage_texts, text_key
-from rendergraph.program.unbound import unbound
+from rendergraph.program.unbound import unbound, unfit_uniforms, uniform_kinds
 from rendergraph.stamps import FileCache
 from rendergraph.steps import Read, Resource, Step
 from rendergraph.textures import FORMATS, GLSL_SHAPES, TextureDesc
@@ -52,7 +52,7 @@ def check_texts(
     seen: set[object] = set()
     for step in steps:
         kinds = tuple((name, sampler_of(read, resources[read.resource])) for name, read in _sampled(step, resources))
-        names = tuple([name for name, _ in step.uniforms])
+        names = uniform_kinds(step)
         key = step.type, step.shaders, step.defines, step.functions, kinds, names, _kept(step, resources)
         if not step.shaders or key in seen:
             continue  # same text as another step
@@ -78,10 +78,16 @@ def _check_step(
     check_kept_text(step, partial(dict, texts), types[step.node].cls, resources)
     _check_samplers(step, texts, resources)
     _check_outs(step, texts, types[step.node].cls, resources)
-    found = [_placed(problem, text, [name]) for text, name, problem in unbound(step, texts, types[step.node].cls)]
+    found = missing(step, texts, types[step.node].cls)
+    found += [_placed(problem, text, [name]) for text, name, problem in unfit_uniforms(step, texts)]
     if any(problem.severity == "error" for problem in found):
         raise InputError([problem for problem in found if problem.severity == "error"])
     return (*found, *(warning for text in texts.values() for warning in text.warnings))
+
+
+def missing(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> list[Problem]:
+    """Return what the shaders of a step use and nothing provides, at the lines of the shaders."""
+    return [_placed(problem, text, [name]) for text, name, problem in unbound(step, texts, cls)]
 
 
 def sampler_of(read: Read, resource: Resource) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import partial
 
 from rendergraph.declare import Node
-from rendergraph.errors import Problem, suggestion
+from rendergraph.errors import Problem, nearest, suggestion
 from rendergraph.glsl.reachable import compiled_text, reachable_names
 from rendergraph.program.text import StageText, prefix
 from rendergraph.steps import Read, Step, Write
@@ -19,14 +19,16 @@ _VIEWS = re.compile(r"\b([A-Za-z_]\w*)_views\b")
 _UNIFORM = re.compile(
     r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?(?!\w*(?:sampler|image))\w+\s+([A-Za-z_][\w\s,]*)[;=\[]"
 )
+_TYPED = re.compile(
+    r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?(float|int|uint|bool|[iu]?vec[234])\s+([A-Za-z_]\w*)\s*;"
+)
 _CONSTANT_IF = re.compile(r"\bif\s*\([A-Z0-9_\s!=<>&|()+-]*[A-Z][A-Z0-9_\s!=<>&|()+-]*\)")
 
 
 def unbound_sampler(step: Step, name: str, sampled: Collection[str], cls: type[Node]) -> str:
     """Return what is wrong with a sampler that the step binds no texture to."""
-    if name in cls.ports() and step.where.caller is not None:
-        text = f"{_files(step)} samples '{name}', a port of the node that this step does not read"
-        return f"{text}; add {name}=self.{name} to the step{_guard(cls, name)}"
+    if name in cls.ports():
+        return f"{_files(step)} samples {_left_out(step, name, cls)}"
     slot = name.endswith("_texture") and step.kind == "geometry"
     guard = f"; not every material has it, so it stands inside #ifdef HAS_{name.upper()}" if slot else ""
     text = f"{_files(step)} samples '{name}', but the step reads no texture of that name"
@@ -68,6 +70,37 @@ def unbound(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> Iter
                 yield text, name, one if is_view or not _CONSTANT_IF.search(own) else one.as_warning()
 
 
+def uniform_kinds(step: Step) -> tuple[tuple[str, int, bool], ...]:
+    """Return the uniforms of a step with the number of their values, and whether these are floats."""
+    found = []
+    for name, value in step.uniforms:
+        numbers = value if isinstance(value, tuple | list) else (value,)
+        found.append((name, len(numbers), any(isinstance(number, float) for number in numbers)))
+    return tuple(found)
+
+
+def unfit_uniforms(step: Step, texts: Mapping[str, StageText]) -> Iterator[tuple[StageText, str, Problem]]:
+    """Yield stage, name and problem of uniforms that are declared with another type than the step gives (RG436)."""
+    given = {name: (count, floats) for name, count, floats in uniform_kinds(step)}
+    values = dict(step.uniforms)
+    for text in texts.values():
+        blocks = [block for block in text.source.blocks if block.origin.file is not None and not block.origin.shared]
+        own = "\n".join("\n".join(block.lines) for block in blocks if not block.origin.prefix)
+        declared = [(kind, name) for kind, name in _TYPED.findall(own) if name in given]
+        for kind, name in declared if len(dict.fromkeys(name for _, name in declared)) == len(declared) else ():
+            count, floats = given[name]
+            if count != (int(kind[-1]) if kind[-1].isdigit() else 1):
+                what = f"{count} number{'' if count == 1 else 's'}"
+            elif floats and kind[0] in "iub":
+                value = values[name]
+                what = f"floats, {(value[0] if isinstance(value, tuple | list) else value)!r}"
+            else:
+                continue
+            message = f"{_files(step)} declares '{name}' as {kind}, but it is given {what}"
+            if name in reachable_names(text.text, certain=True):
+                yield text, name, step.problem("RG436", message)
+
+
 def _suspects(
     step: Step, own: str, whole: str, given: Collection[str], set_names: Collection[str], cls: type[Node]
 ) -> Iterator[tuple[str, tuple[str, Callable[[], str]]]]:
@@ -92,13 +125,19 @@ def _without_views(step: Step, port: str, given: Collection[str], cls: type[Node
     if port in given:
         text = f"{_files(step)} looks at the views of '{port}', but that texture was not drawn with a view"
         return f"{text}; use `camera`, or give its output `view=`"
-    text = f"{_files(step)} looks at the views of '{port}', a port of the node that this step does not read"
-    return f"{text}; add {port}=self.{port} to the step{_guard(cls, port)}"
+    return f"{_files(step)} looks at the views of {_left_out(step, port, cls)}"
 
 
-def _guard(cls: type[Node], name: str) -> str:
+def _left_out(step: Step, name: str, cls: type[Node]) -> str:
+    """Say why a step does not read a port of its node, and the way out."""
     optional = getattr(cls.ports()[name], "optional", False)
-    return f", or leave it out by #ifdef HAS_{name.upper()} where it is not connected" if optional else ""
+    guard = f"leave it out by #ifdef HAS_{name.upper()}"
+    if step.where.caller is None:  # it reads all that is connected
+        return f"'{name}', which is not connected here; {guard}" if optional else f"'{name}', which it does not read"
+    near = nearest(name, {use.name for use in step.reads} - cls.ports().keys())
+    way = f"give it as {name}=…, not {near}=…" if near is not None else f"add {name}=self.{name} to the step"
+    more = f", or {guard} where it is not connected" if optional else ""
+    return f"'{name}', a port of the node that this step does not read; {way}{more}"
 
 
 def _files(step: Step) -> str:

@@ -122,3 +122,51 @@ def numbers(self, scene):  # here
         gl.render(author.pipeline(text))
     assert f"wrong.py:{author.line()}: " in str(caught.value)
     assert "'color' takes 1 × 1 × 4 × 1 numbers" in str(caught.value)
+
+
+def test_a_port_under_another_name_is_named(author: Any, gl: rg.Session) -> None:
+    author.node(BODY.replace("depth=self.depth", "dpeth=self.depth"))
+    author.write(wrong__frag=main_of("depth_views[0].eye"))
+    for act in (author.pipeline(TEXT).check, lambda: gl.render(author.pipeline(TEXT))):
+        (said,) = author.said(act)
+        assert said.endswith(
+            "'depth', a port of the node that this step does not read; give it as depth=…, not dpeth=…"
+        )
+
+
+def test_an_unconnected_input_without_a_guard(author: Any, gl: rg.Session) -> None:
+    author.node(BODY.partition("\ndef record")[0])
+    author.write(wrong__frag=main_of(READ.format("normal")).replace(", wind", "").replace("wind *", ""))
+    pipeline = author.pipeline(TEXT.replace(", normal: gbuffer.normal", ""))
+    for act in (pipeline.check, lambda: gl.render(pipeline)):
+        (said,) = author.said(act)
+        assert said.endswith("samples 'normal', which is not connected here; leave it out by #ifdef HAS_NORMAL")
+
+
+@pytest.mark.parametrize(
+    ("declared", "message"),
+    [("int gain", "as int, but it is given floats, 1.0"), ("vec3 wind", "as vec3, but it is given 1 number")],
+)
+def test_a_uniform_of_another_type(author: Any, gl: rg.Session, declared: str, message: str) -> None:
+    author.node(BODY)
+    name = declared.split()[1]
+    source = main_of(READ.format("depth")).replace(
+        "uniform float gain, wind;", "uniform float gain;\nuniform float wind;"
+    )
+    source = source.replace(f"uniform float {name}", f"uniform {declared}").replace("wind * (", "vec4(wind.x) * (")
+    author.write(wrong__frag=source.replace("wind.x", "wind.x" if name == "wind" else "wind"))
+    for act in (author.pipeline(TEXT).check, lambda: gl.render(author.pipeline(TEXT))):
+        (said,) = author.said(act)
+        assert said.startswith("wrong.frag:")
+        assert "RG436" in said
+        assert said.endswith(f"declares '{name}' {message}")
+
+
+def test_whole_numbers_at_a_shipped_node_are_named_at_the_link(author: Any) -> None:
+    author.node('color = Output(Radiance, format="rgba16ui", doc="Colour.")')
+    author.write(wrong__frag="out uvec4 color;\nvoid main() { color = uvec4(1u); }\n")
+    text = "nodes:\n  a: {type: wrong}\n  b: {type: tonemap, inputs: {radiance: a.color}}\noutputs: {image: b.color}\n"
+    (said,) = author.said(author.pipeline(text).check)
+    assert said == (
+        "test.yaml:5:41: RG215 'b.radiance' reads no whole numbers, but 'a.color' (line 4) has the format rgba16ui"
+    )

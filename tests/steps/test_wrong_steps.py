@@ -64,7 +64,7 @@ CALLS = {
     'steps.fullscreen("wrong.frag", state="additive")': "RG423 state is 'additive', not a State",
     'steps.fullscreen("wrong.frag", state=ADD)': "RG423 state is Blend(src='one', dst='one', src_alpha=None, dst_alpha=Non..., not a State",
     'steps.fullscreen("wrong.frag", state=State(depth_func="less_equal"))': "RG423 State: depth_func is 'less_equal'; did you mean 'lequal'?",
-    'steps.fullscreen("wrong.frag", state=State(blend="add"))': "RG423 State: blend is 'add', not a Blend, a tuple of them, or None",
+    'steps.fullscreen("wrong.frag", state=State(blend="add"))': "RG423 State: blend is 'add', not a Blend such as ADD, a tuple of them, or None",
     'steps.fullscreen("wrong.frag", state=State(color_mask=(True, True, True)))': "RG423 State: color_mask is (True, True, True), not four of True and False",
     'steps.fullscreen("wrong.frag", state=State(scissor=(0, 0, 0.5, 1)))': "RG423 State: scissor is (0, 0, 0.5, 1), not x, y, width and height in texels or None; divide with //",
     'steps.fullscreen("wrong.frag", state=State(stencil=Stencil(StencilFace(func="equals"))))': "RG423 StencilFace: func is 'equals'; did you mean 'equal'?",
