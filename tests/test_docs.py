@@ -116,7 +116,8 @@ def _check_yaml(block: Block, where: str, capsys: pytest.CaptureFixture[str]) ->
         return
     path = Path(name)
     path.write_text(block.text, encoding="utf-8")
-    plugins = [word for plugin in Path().glob("*.py") for word in ("--plugin", str(plugin))]
+    found = [*Path().glob("*.py"), *dict.fromkeys(file.parent for file in Path().glob("*/*.py"))]
+    plugins = [word for plugin in found for word in ("--plugin", str(plugin))]
     if "scene" in document and "nodes" not in document and "extends" not in document:
         words = ["check", "forward", "--scene", name]
     elif "extends" in document or "outputs" in document:

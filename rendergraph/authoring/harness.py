@@ -207,7 +207,7 @@ def _function_source(signature: Signature, folder: Path) -> type[Node]:
 
 def _varied(signature: Signature) -> str:
     kind, value = signature.declaration.split()[0], signature.neutral
-    if signature.texture is None and kind.startswith("vec"):
+    if signature.texture is None and kind.startswith(("vec", "float")):
         arguments = re.findall(r"(\w+)\s+(\w+)\s*[,)]", signature.declaration)
         parts = [f"dot({name}, {of}(0.3))" for of, name in arguments if of in ("vec2", "vec3", "vec4")]
         parts += [f"0.3 * float({name})" for of, name in arguments if of in ("float", "int", "uint", "bool")]
