@@ -41,7 +41,11 @@ _MOST_PARTS = 64
 """Lists of some of the steps that are remembered."""
 
 
-_OF_INSTANCES = {"scene_instance_block": "instances", "scene_previous_block": "instances before"}
+_OF_INSTANCES = {
+    "scene_instance_block": "instances",
+    "scene_tree_block": "instances",
+    "scene_previous_block": "instances before",
+}
 """Blocks of the scene's data that change with other sources."""
 
 

@@ -28,6 +28,7 @@ from rendergraph.scene.facts import Decode
 from rendergraph.scene.model import ImageSource, MadeImage, Scene, Texture, changed_objects
 from rendergraph.scene.pack import PackedScene, Records
 from rendergraph.scene.scene_data import data_macros, instance_data, used_textures
+from rendergraph.scene.tree_data import MeshTrees, mesh_trees, object_rows
 from rendergraph.textures import TextureDesc, full_mip_count
 
 DecodeLight = Callable[[ImageSource | MadeImage], npt.NDArray[Any]]
@@ -90,6 +91,7 @@ class GpuScene(Struct, eq=False, dict=True):
     _environment: GpuTexture | None = None
     _before: moderngl.Buffer | None = None
     _data: SceneBuffers | None = None
+    _tree: tuple[MeshTrees, moderngl.Buffer] | None = None
     _stale_instances: set[int] = set()  # objects that have moved since the frame before was kept
 
     def __post_init__(self) -> None:
@@ -148,6 +150,9 @@ class GpuScene(Struct, eq=False, dict=True):
                 if self._data is not None:
                     self._data.instances = instance_data(scene, packed)
                     write_records(self._data.buffers["scene_instance_block"], self._data.instances, moved)
+                if self._tree is not None:
+                    trees, buffer = self._tree
+                    buffer.write(object_rows(packed, self.data.instances["flags"], trees).tobytes())
         for section in moving_plugin_keys(scene) & _SECTIONS.keys():
             pairs = zip(getattr(self.scene, section), getattr(scene, section), strict=True)
             self.changes[_SECTIONS[section]] += any(before.extra != now.extra for before, now in pairs)
@@ -172,6 +177,14 @@ class GpuScene(Struct, eq=False, dict=True):
             indices = self._indices["triangles"].buffer
             self._data = SceneBuffers.make(self.device, self.scene, self.packed, indices, images)
         return self._data
+
+    def tree(self) -> moderngl.Buffer:
+        """The trees for `trace.glsl`, built when a program first looks at them."""
+        if self._tree is None:
+            trees = mesh_trees(self.scene, self.packed)
+            rows = object_rows(self.packed, self.data.instances["flags"], trees)
+            self._tree = trees, self.device.ctx.buffer(rows.tobytes() + trees.rows.tobytes())
+        return self._tree[1]
 
     @property
     def data_defines(self) -> dict[str, str]:
@@ -286,6 +299,8 @@ class GpuScene(Struct, eq=False, dict=True):
         self._instances.release()
         if self._data is not None:
             self._data.release()
+        if self._tree is not None:
+            self._tree[1].release()
         if self._before is not None:
             self._before.release()
         for image in (*self._images.values(), *([self._environment] if self._environment else [])):

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from rendergraph.facts import SceneDataFacts
 from rendergraph.scene.model import ImageSource, Scene, Texture
 from rendergraph.scene.pack import SLOTS, PackedScene, Records
+from rendergraph.scene.tree_data import stack_size
 from rendergraph.textures import FORMATS, TextureDesc
 
 _FLAGS = (
@@ -161,6 +162,7 @@ def data_macros(scene: Scene, packed: PackedScene, arrays: TextureArrays) -> dic
         "SCENE_INSTANCE_COUNT": str(len(scene.objects)),
         "SCENE_TRIANGLE_COUNT": str(facts.triangles),
         "SCENE_EMITTER_COUNT": str(facts.emitters),
+        "TRACE_STACK": str(stack_size(scene)),
         **{f"SCENE_{name.upper()}": str(bit) for name, bit in FLAGS.items()},
     }
     macros |= {f"SCENE_{name.upper()}_STREAM": "1" for name in _OPTIONAL if getattr(packed, name) is not None}
@@ -173,6 +175,8 @@ def data_macros(scene: Scene, packed: PackedScene, arrays: TextureArrays) -> dic
     macros |= {f"SCENE_{slot.upper()}_ARRAYS": str(bits) for slot, bits in used.items() if bits}
     if any(map(scene.has_grain, scene.materials)):
         macros["SCENE_GRAIN"] = "1"
+    if "mask" in packed.alpha_mode:
+        macros["SCENE_ANY_MASKED"] = "1"
     if packed.material_moved.any():
         macros["HAS_UV_TRANSFORM"] = "1"
     return macros
