@@ -62,8 +62,8 @@ vec3 previous_object_to_world(vec3 p) {
 #endif
 }
 
-// Writes the clip-space positions in this frame and the previous one, for `fragment_velocity()`, of a vertex with these
-// world-space positions. A vertex shader that moves vertices calls it with where it moves them, and has moved them to.
+// Writes the clip-space positions in this frame and the previous one, for `fragment_velocity()`. `position` and
+// `previous_position` are where the vertex is and was in world space; a vertex shader that moves vertices calls it so.
 void write_velocity_varyings(vec3 position, vec3 previous_position) {
 #ifdef WRITES_VELOCITY
     v_clip_position = world_to_clip(position);
@@ -71,6 +71,7 @@ void write_velocity_varyings(vec3 position, vec3 previous_position) {
 #endif
 }
 
+// The same of a vertex that moves with its object alone.
 void write_velocity_varyings() {
     write_velocity_varyings(object_to_world(in_position), previous_object_to_world(in_position));
 }
