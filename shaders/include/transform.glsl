@@ -52,7 +52,7 @@ vec4 world_to_clip(vec3 position) {
     return PASS_VIEW.view_projection * vec4(position, 1.0);
 }
 
-// World-space position in the previous frame of a point of the object; in a pass without velocity, in this frame.
+// World-space position in the previous frame of a point `p` of the object; in a pass without velocity, in this frame.
 vec3 previous_object_to_world(vec3 p) {
 #ifdef WRITES_VELOCITY
     vec4 q = vec4(p, 1.0);
