@@ -53,6 +53,13 @@ def test_declaration(name: str) -> None:
     assert node.family, "nodes lie in a family's folder"
 
 
+@pytest.mark.parametrize("name", [name for name in BUILTIN if CATALOG.get(name).cls.twin])
+def test_a_twin_exists_and_has_the_outputs_of_what_it_replaces(name: str) -> None:
+    cls = CATALOG.get(name).cls
+    twin = CATALOG.get(str(cls.twin)).cls
+    assert cls.outputs().keys() <= twin.outputs().keys()
+
+
 @pytest.mark.parametrize("name", BUILTIN)
 def test_docs_are_sentences(name: str) -> None:
     assert list(doc_problems(CATALOG.get(name).cls)) == []
