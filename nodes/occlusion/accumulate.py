@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from rendergraph.api import Any as AnyTexel
-from rendergraph.api import Depth, History, Input, Node, Normal, Output, Steps, Velocity, param
+from rendergraph.api import Depth, History, Input, Node, Normal, Output, Steps, param
+
+from ..geometry._velocity import Velocity
 
 
 class Accumulate(Node):

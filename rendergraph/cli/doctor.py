@@ -37,6 +37,8 @@ def command(as_json: bool) -> None:
 
 
 def examine() -> dict[str, Any]:
+    from rendergraph import mitsuba
+
     found = _probe()
     devices = [device | _probe(str(device["number"])) for device in found.get("devices", [])]
     for device in devices:
@@ -52,6 +54,7 @@ def examine() -> dict[str, Any]:
         "libraries": found.get("libraries", {}),
         "problem": found.get("problem"),
         "devices": devices,
+        "mitsuba": mitsuba.examine(),
         "install": _advice(found, devices, packages),
     }
 
@@ -128,7 +131,13 @@ def _text(report: dict[str, Any]) -> str:
         words += [device[key] for key in ("render_node", "drm") if device.get(key)][:1]
         rows.append((device["number"], "yes", device["renderer"], ", ".join(words)))
     lines.append(table(rows, ("device", "usable", "renderer", "properties")) if rows else "no GL devices")
-    lines.append("")
+    lines += ["", _mitsuba_line(report["mitsuba"]), ""]
     lines.append("ready to render" if report["ok"] else "cannot render here yet")
     lines += [f"  {line}" for line in report["install"]]
     return "\n".join(lines)
+
+
+def _mitsuba_line(found: dict[str, Any]) -> str:
+    if found["install"]:
+        return f"--reference mitsuba needs: {', '.join(found['install'])}"
+    return f"--reference mitsuba: Mitsuba {found['mitsuba']}, LLVM {found['llvm']}"

@@ -264,14 +264,10 @@ def declared_blocks(text: str) -> Iterator[tuple[str, str, set[str]]]:
             yield words[storage], name[0], members | ({own} if own else set())
 
 
-used_names = lru_cache(maxsize=256)(reachable_names)
-"""The names that `main` of a program text reaches."""
-
-
 @lru_cache(maxsize=256)
 def used_blocks(text: str) -> frozenset[str]:
     """Return the blocks of which `main` of a program text, or what it calls, uses a member."""
-    names = used_names(text)
+    names = reachable_names(text)
     return frozenset(block for _, block, members in declared_blocks(text) if not names.isdisjoint(members))
 
 

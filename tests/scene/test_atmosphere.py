@@ -8,8 +8,9 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 import pytest
-from rendergraph.pipelines.environments import atmosphere
-from rendergraph.pipelines.environments.atmosphere import GROUND, TOP, VIEWER, Atmosphere
+
+from rendergraph.scene import atmosphere
+from rendergraph.scene.atmosphere import GROUND, TOP, VIEWER, Atmosphere
 
 Floats = npt.NDArray[np.float64]
 
