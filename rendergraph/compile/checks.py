@@ -11,7 +11,15 @@ from rendergraph.declare import Node
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.gl.programs import Program, Uniform, member_offsets, outputs_of
 from rendergraph.glsl.globals import globals_of
-from rendergraph.program import Texts, named_reads, unbound_sampler, unfit_outputs, unfit_sampler, unset_uniform
+from rendergraph.program import (
+    Texts,
+    named_reads,
+    unbound_block,
+    unbound_sampler,
+    unfit_outputs,
+    unfit_sampler,
+    unset_uniform,
+)
 from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import BufferDesc
 
@@ -100,13 +108,9 @@ def _samplers(step: Step, program: Program, resources: Mapping[str, Resource], t
 
 def _blocks(step: Step, program: Program, given: Collection[str], texts: Texts) -> Iterator[Problem]:
     """A buffer that nothing is bound to would be written nowhere, or over another node's."""
-    files = ", ".join(file for _, file in step.shaders)
-    uses: tuple[Read | Write, ...] = (*step.all_reads, *step.writes)
-    own = ", ".join(sorted({use.name for use in uses if use.use == "buffer"})) or "none"
     for name in program.block_names:
         if name not in given:
-            text = f"{files} looks at block '{name}', but the step has no buffer of that name; it has {own}"
-            yield _placed(step.problem("RG430", text), name, texts)
+            yield _placed(step.problem("RG430", unbound_block(step, name)), name, texts)
 
 
 def _elements(step: Step, program: Program, resources: Mapping[str, Resource], texts: Texts) -> Iterator[Problem]:

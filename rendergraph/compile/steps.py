@@ -32,6 +32,7 @@ from rendergraph.gl.programs import Program
 from rendergraph.gl.queries import OcclusionQuery, Timer
 from rendergraph.gl.raw import RawGL
 from rendergraph.gl.textures import Clear, poison_value
+from rendergraph.glsl.globals import declared_blocks
 from rendergraph.glsl.reachable import compiled_text
 from rendergraph.program import (
     StageText,
@@ -39,7 +40,6 @@ from rendergraph.program import (
     Texts,
     check_kept_text,
     check_scene_includes,
-    declared_blocks,
     missing,
     positions_macro,
 )

@@ -128,8 +128,20 @@ def author_problem(error: BaseException, cls: type, file: Path | None = None, su
     place = source_location(error, cls.__module__) or (error.place if isinstance(error, Misuse) else None)
     if place is None and file is not None and file.name:
         place = Place(shown_file(file))
-    text = str(error) if isinstance(error, Misuse) else f"{describe_error(error)}{_attribute_hint(error)}"
+    text = str(error) if isinstance(error, Misuse) else describe_error(error)
+    if isinstance(error, KeyError) and issubclass(cls, Node):
+        text += _input_hint(error, cls)
+    elif not isinstance(error, Misuse):
+        text += _attribute_hint(error)
     return Problem("RG420", text, subject=subject, cause=place)
+
+
+def _input_hint(error: KeyError, cls: type[Node]) -> str:
+    """Say of a name that `facts.input` does not find whether the node has such an input."""
+    name = str(error.args[0]) if error.args else ""
+    if name in cls.inputs():
+        return "; that input is not connected, ask `connected` first"
+    return suggestion(name, cls.inputs(), most=0)
 
 
 def _attribute_hint(error: BaseException) -> str:

@@ -56,6 +56,8 @@ _OF_THE_FRAMEWORK = frozenset(
 _ROLES = "param(…), define(…) or structural(…)"
 
 
+_METHODS = {"record": "self, steps", "update": "self, frame", "camera_jitter": "self, frame"}
+_TAKES_ANY = 0x04  # of a function with *arguments
 _SOUND: WeakSet[type[Node]] = WeakSet()
 """Classes without mistakes: every pipeline that is read asks, and an edited class is another one."""
 
@@ -118,6 +120,13 @@ def _names(cls: type[Node], lenient: bool) -> Iterator[Problem]:
             and name not in {*inherited, *parameters}
         ):
             yield _problem(name, f"'{name}' is None, which drops a port that a base declares; none declares '{name}'")
+    for name, takes in _METHODS.items():
+        code = getattr(getattr(cls, name), "__code__", None)
+        if code is None or code is vars(Node)[name].__code__ or code.co_flags & _TAKES_ANY:
+            continue
+        named = code.co_varnames[: code.co_argcount]
+        if not len(named) - len(getattr(cls, name).__defaults__ or ()) <= 2 <= len(named):
+            yield _problem(name, f"`{name}` takes ({', '.join(named)}); declare it as {name}({takes})")
     shader = cls.shader
     if shader is not None and (not isinstance(shader, str) or not shader.endswith((".frag", ".comp"))):
         yield _problem("shader", f"`shader` is {shader!r}; it is a file that ends in .frag or .comp")

@@ -67,9 +67,23 @@ class _VersionAssignment:
         else:
             for recording in self.recordings.values():
                 self._node(recording)
+        self._check_buffers()
         return VersionedSteps(
             self.steps, self.resources, self.version, self.final, self.forwarded, self.firsts, self.idle, self.views
         )
+
+    def _check_buffers(self) -> None:
+        """Refuse reads of buffers that nothing writes, neither a step nor `update`."""
+        unwritten = {id for id, version in self.version.items() if version == 0 and self._is_unfilled(id)}
+        for step in self.steps if unwritten else ():
+            for read in step.all_reads:
+                if read.resource in unwritten and not read.previous:
+                    text = f"it reads the buffer '{read.resource}', but no step writes it, and its node has no `update`"
+                    raise InputError(step.problem("RG601", text))
+
+    def _is_unfilled(self, id: str) -> bool:
+        node = self.graph[id.rpartition(".")[0]].node
+        return isinstance(self.resources[id].desc, BufferDesc) and type(node).update is Node.update
 
     def _node(self, recording: Recording) -> None:
         self._declare(recording)
@@ -307,6 +321,9 @@ class _VersionAssignment:
             if index is not None and index >= max(1, count):
                 text = f"view_index is {index}, but '{port.name}' has {count} views, counted from 0"
                 raise self._refused(recording, request, "RG423", text)
+            if type(recording.node.node).update is Node.update:
+                text = f"it draws with the views of '{port.name}', which nothing sets; set them in `update`"
+                raise self._refused(recording, request, "RG433", text)
             return table, index
         name = port.name if isinstance(port, Input | InOut) else "view"
         ends = recording.links.get(name, ())

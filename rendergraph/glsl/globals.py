@@ -7,12 +7,16 @@ pipeline knows.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TypeAlias
 
 from msgspec import Struct, field
 
-from rendergraph.glsl.names import TOKEN, Storage, declarators, head, statements, without_directives
+from rendergraph.glsl.names import TOKEN, Storage, declarators, head, statements, tokens, without_directives
+
+_SAMPLER = r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?([iu]?sampler\w+)\s+([^;]+);"
+_NAME = r"[A-Za-z_]\w*"
+_BRACES = r"(?:\A|(?<=[;{}]))([^;{}]*)\{([^{}]*)\}(?=\s*([A-Za-z_]\w*)?)"
 
 _MACRO = re.compile(r"^[ \t]*#[ \t]*define[ \t]+([A-Za-z_]\w*)[ \t]+(\d{1,9})[ \t]*$", re.MULTILINE)
 
@@ -64,6 +68,24 @@ class Globals(Struct, frozen=True):
         if text not in self.numbers:
             raise ValueError(f"'{text}' is neither a number nor a macro that is one; write a number")
         return self.numbers[text]
+
+
+def declared_samplers(text: str) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for kind, names in re.findall(_SAMPLER, text):
+        for name in re.findall(_NAME, names):
+            found.setdefault(name, []).append(kind)
+    return found
+
+
+def declared_blocks(text: str) -> Iterator[tuple[str, str, set[str]]]:
+    """Yield each `uniform` or storage (`buffer`) block with the names of its members, or its instance."""
+    for before, body, own in re.findall(_BRACES, without_directives(text)):
+        words = tokens(before)
+        storage = next((at for at, word in enumerate(words) if word in ("uniform", "buffer")), None)
+        if storage is not None and (name := head(words[storage:]).rest[:1]):
+            members = {made for one, _ in statements(tokens(body)) for made, _, _ in declarators(head(one).rest[1:])}
+            yield words[storage], name[0], members | ({own} if own else set())
 
 
 def globals_of(text: str) -> Globals:

@@ -18,7 +18,6 @@ from rendergraph.program.checks import Texts as Texts
 from rendergraph.program.checks import check_kept_text as check_kept_text
 from rendergraph.program.checks import check_scene_includes as check_scene_includes
 from rendergraph.program.checks import check_texts as check_texts
-from rendergraph.program.checks import declared_blocks as declared_blocks
 from rendergraph.program.checks import missing as missing
 from rendergraph.program.checks import named_reads as named_reads
 from rendergraph.program.checks import unfit_outputs as unfit_outputs
@@ -30,5 +29,6 @@ from rendergraph.program.text import positions_macro as positions_macro
 from rendergraph.program.text import prefix as prefix
 from rendergraph.program.text import stage_texts as stage_texts
 from rendergraph.program.text import text_key as text_key
+from rendergraph.program.unbound import unbound_block as unbound_block
 from rendergraph.program.unbound import unbound_sampler as unbound_sampler
 from rendergraph.program.unbound import unset_uniform as unset_uniform

@@ -10,8 +10,7 @@ from rendergraph.catalog import NodeType
 from rendergraph.declare import Input, Node
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.expand import ViewTable
-from rendergraph.glsl.globals import globals_of
-from rendergraph.glsl.names import declarators, head, statements, tokens, without_directives
+from rendergraph.glsl.globals import declared_blocks, declared_samplers, globals_of
 from rendergraph.glsl.reachable import reachable_names
 from rendergraph.program.text import StageText, prefix, stage_texts, text_key
 from rendergraph.program.unbound import unbound, unfit_uniforms, uniform_kinds
@@ -35,9 +34,6 @@ _MOVING = {
 }
 _OF_SCENE_DATA = ("light_block", "material_block")
 _OF_SCENE = ("scene.glsl", "previous_scene.glsl", "trace.glsl")
-_SAMPLER = r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?([iu]?sampler\w+)\s+([^;]+);"
-_NAME = r"[A-Za-z_]\w*"
-_BRACES = r"(?:\A|(?<=[;{}]))([^;{}]*)\{([^{}]*)\}(?=\s*([A-Za-z_]\w*)?)"
 
 
 def check_texts(
@@ -214,14 +210,6 @@ def _always(text: str) -> str:
     return "\n".join(kept)
 
 
-def declared_samplers(text: str) -> dict[str, list[str]]:
-    found: dict[str, list[str]] = {}
-    for kind, names in re.findall(_SAMPLER, text):
-        for name in re.findall(_NAME, names):
-            found.setdefault(name, []).append(kind)
-    return found
-
-
 def check_kept_text(step: Step, texts: Texts, cls: type[Node], resources: Mapping[str, Resource]) -> None:
     """Refuse a step that makes a persistent value from the camera, time, lights, views or a transient input (RG439)."""
     kept = _kept(step, resources)
@@ -252,16 +240,6 @@ def _reached(text: str) -> tuple[set[str], set[str], list[tuple[str, str, set[st
 
 def _kept(step: Step, resources: Mapping[str, Resource]) -> str | None:
     return next((write.resource for write in step.writes if resources[write.resource].role == "kept"), None)
-
-
-def declared_blocks(text: str) -> Iterator[tuple[str, str, set[str]]]:
-    """Yield each `uniform` or storage (`buffer`) block with the names of its members, or its instance."""
-    for before, body, own in re.findall(_BRACES, without_directives(text)):
-        words = tokens(before)
-        storage = next((at for at, word in enumerate(words) if word in ("uniform", "buffer")), None)
-        if storage is not None and (name := head(words[storage:]).rest[:1]):
-            members = {made for one, _ in statements(tokens(body)) for made, _, _ in declarators(head(one).rest[1:])}
-            yield words[storage], name[0], members | ({own} if own else set())
 
 
 @lru_cache(maxsize=256)

@@ -11,6 +11,7 @@ from functools import partial
 
 from rendergraph.declare import Node
 from rendergraph.errors import Problem, nearest, suggestion
+from rendergraph.glsl.globals import declared_blocks, declared_samplers
 from rendergraph.glsl.reachable import compiled_text, reachable_names
 from rendergraph.program.text import StageText, prefix
 from rendergraph.steps import Read, Step, Write
@@ -29,10 +30,22 @@ def unbound_sampler(step: Step, name: str, sampled: Collection[str], cls: type[N
     """Return what is wrong with a sampler that the step binds no texture to."""
     if name in cls.ports():
         return f"{_files(step)} samples {_left_out(step, name, cls)}"
+    for function in step.functions:
+        stem = name.removeprefix(prefix(function.node))
+        if stem != name:
+            text = f"{function.shader} of node '{function.node}' samples '{stem}'"
+            return f"{text}, which is not among the `reads` of its Function; add it there"
     slot = name.endswith("_texture") and step.kind == "geometry"
     guard = f"; not every material has it, so it stands inside #ifdef HAS_{name.upper()}" if slot else ""
     text = f"{_files(step)} samples '{name}', but the step reads no texture of that name"
     return f"{text}; it reads {', '.join(sorted(sampled)) or 'none'}{guard}"
+
+
+def unbound_block(step: Step, name: str) -> str:
+    """Return what is wrong with a block that the step binds no buffer to."""
+    uses: tuple[Read | Write, ...] = (*step.all_reads, *step.writes)
+    own = ", ".join(sorted({use.name for use in uses if use.use == "buffer"})) or "none"
+    return f"{_files(step)} looks at block '{name}', but the step has no buffer of that name; it has {own}"
 
 
 def unset_uniform(step: Step, name: str) -> str:
@@ -53,13 +66,14 @@ def unbound(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> Iter
     set_names |= {prefix(each.node) + name for each in step.functions for name, _ in each.uniforms}
     for text in texts.values():
         blocks = [block for block in text.source.blocks if block.origin.file is not None and not block.origin.shared]
-        own = "\n".join("\n".join(block.lines) for block in blocks if not block.origin.prefix)
+        own = "\n".join("\n".join(block.lines) for block in blocks)
         found = dict(_suspects(step, own, text.text, given, set_names, cls))
         if found:  # mostly in a branch that the step's macros exclude
             macros = [line for block in text.source.blocks if block.origin.file is None for line in block.lines]
             quick = compiled_text("\n".join([*macros, own]), certain=True)
             found = {name: problem for name, problem in found.items() if re.search(rf"\b{name}\b", quick)}
-        if not found:
+        buffers = [name for kind, name, _ in declared_blocks(own) if kind == "buffer" and name not in given]
+        if not found and not buffers:
             continue
         names = reachable_names(text.text, certain=True)
         declared = compiled_text(text.text, certain=True)
@@ -68,6 +82,10 @@ def unbound(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> Iter
             if name in names and (is_view or re.search(rf"\buniform\b[^;{{}}]*\b{name}\b", declared)):
                 one = step.problem(code, describe())
                 yield text, name, one if is_view or not _CONSTANT_IF.search(own) else one.as_warning()
+        for kind, name, members in declared_blocks(declared) if buffers else ():
+            if kind == "buffer" and name in buffers and not names.isdisjoint(members):
+                one = step.problem("RG430", unbound_block(step, name))
+                yield text, name, one if not _CONSTANT_IF.search(own) else one.as_warning()
 
 
 def uniform_kinds(step: Step) -> tuple[tuple[str, int, bool], ...]:
@@ -105,8 +123,6 @@ def _suspects(
     step: Step, own: str, whole: str, given: Collection[str], set_names: Collection[str], cls: type[Node]
 ) -> Iterator[tuple[str, tuple[str, Callable[[], str]]]]:
     """Yield names, with the code of the problem and what returns its text."""
-    from rendergraph.program.checks import declared_samplers
-
     ports = cls.ports()
     for name in declared_samplers(own).keys() - given:
         if not (name.endswith("_texture") and step.kind == "geometry"):
@@ -123,8 +139,8 @@ def _suspects(
 
 def _without_views(step: Step, port: str, given: Collection[str], cls: type[Node]) -> str:
     if port in given:
-        text = f"{_files(step)} looks at the views of '{port}', but that texture was not drawn with a view"
-        return f"{text}; use `camera`, or give its output `view=`"
+        text = f"{_files(step)} looks at the views of '{port}', but what is linked there was not drawn with a view"
+        return f"{text}; use `camera`, or give the linked output `view=`"
     return f"{_files(step)} looks at the views of {_left_out(step, port, cls)}"
 
 

@@ -186,19 +186,15 @@ def test_a_jitter_that_fails(author: Any, gl: rg.Session, value: str, said_of: s
     assert said.removeprefix("test.yaml:4:3: RG433 node 'a' (wrong) failed in camera_jitter: ").endswith(text)
 
 
-SIGNATURES = {
-    "record": "RG420 node 'a' (wrong) failed while recording: wrong.py: TypeError: Wrong.record() takes 1 positional "
-    "argument but 2 were given",
-    "update": "RG433 node 'a' (wrong) failed in update: wrong.py: TypeError: Wrong.update() takes 1 positional argument but "
-    "2 were given",
-}
+SIGNATURES = {"record": "self, steps", "update": "self, frame"}
 
 
 @pytest.mark.parametrize("hook", SIGNATURES)
 def test_a_hook_that_takes_nothing(author: Any, gl: rg.Session, hook: str) -> None:
-    author.node(f"{COLOR}def {hook}(self):\n    pass")
+    author.node(f"{COLOR}def {hook}(self):  # here\n    pass")
     (said,) = author.said(lambda: gl.render(author.pipeline()))
-    assert said == f"test.yaml:4:3: {SIGNATURES[hook]}"
+    way = f"`{hook}` takes (self); declare it as {hook}({SIGNATURES[hook]})"
+    assert said == f"wrong.py:{author.line()}:5: RG490 node type 'wrong': {way}"
 
 
 def test_views_that_nobody_sets(author: Any, gl: rg.Session) -> None:
@@ -210,7 +206,8 @@ def test_views_that_nobody_sets(author: Any, gl: rg.Session) -> None:
     with pytest.raises(InputError, match="RG433"):
         gl.render(pipeline)
     (said,) = author.said(lambda: gl.render(pipeline))
-    assert said == "test.yaml:5:3: RG433 node 'a' (wrong) never sets the views of 'a.views'; do so in `update`"
+    way = "it draws with the views of 'views', which nothing sets; set them in `update`"
+    assert said == f"test.yaml:5:3: RG433 node 'a' (wrong): wrong.py:{author.line('steps.geometry')}: {way}"
 
 
 # --- what one node forgets and another reads -------------------------------------------------------------------------

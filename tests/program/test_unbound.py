@@ -170,3 +170,71 @@ def test_whole_numbers_at_a_shipped_node_are_named_at_the_link(author: Any) -> N
     assert said == (
         "test.yaml:5:41: RG215 'b.radiance' reads no whole numbers, but 'a.color' (line 4) has the format rgba16ui"
     )
+
+
+def test_a_block_that_the_step_has_no_buffer_for(author: Any, gl: rg.Session) -> None:
+    body = BODY.replace("depth=self.depth", "depth=self.depth, numbers=self.numbers")
+    author.node(body.replace("\ndef record", 'numbers = Internal(kind="buffer", bytes=16)\n\ndef record') + UPDATE)
+    text = "layout(std430) readonly buffer number { vec4 values[]; };\n" + main_of("values[0]")
+    author.write(wrong__frag=text)
+    for act in (author.pipeline(TEXT).check, lambda: gl.render(author.pipeline(TEXT))):
+        (said,) = author.said(act)
+        assert said.startswith("wrong.frag:1:32: RG430 ")
+        assert said.endswith("looks at block 'number', but the step has no buffer of that name; it has numbers")
+
+
+UPDATE = """
+def update(self, frame):
+    frame.write(self.numbers, numpy.zeros(4, numpy.float32))
+"""
+
+
+def test_a_buffer_that_nothing_writes(author: Any, gl: rg.Session) -> None:
+    body = BODY.replace("depth=self.depth", "depth=self.depth, numbers=self.numbers")
+    body = body.replace("\ndef record", 'numbers = Internal(kind="buffer", bytes=16)\n\ndef record')
+    author.write(wrong__frag="buffer numbers { vec4 values[]; };\n" + main_of("values[0]"))
+    author.node(body)
+    (said,) = author.said(author.pipeline(TEXT).check)
+    assert said.endswith("it reads the buffer 'a.numbers', but no step writes it, and its node has no `update`")
+    author.node(body + UPDATE)
+    author.pipeline(TEXT).check()
+
+
+@pytest.mark.parametrize(("method", "takes"), [("update", "frame"), ("record", "steps"), ("camera_jitter", "frame")])
+def test_a_method_with_too_few_arguments(author: Any, method: str, takes: str) -> None:
+    author.node(f'color = Output(Radiance, doc="Colour.")\n\ndef {method}(self):\n    pass\n')
+    (said,) = author.said(author.pipeline().check)
+    assert said.endswith(f"`{method}` takes (self); declare it as {method}(self, {takes})")
+
+
+def test_views_that_nothing_sets(author: Any) -> None:
+    author.node("""
+color = Output(Radiance, doc="Colour.")
+mine = Views(doc="Views.")
+
+def record(self, steps):
+    steps.geometry("wrong.frag", view=self.mine)
+""")
+    (said,) = author.said(author.pipeline().check)
+    assert said.endswith("it draws with the views of 'mine', which nothing sets; set them in `update`")
+
+
+def test_what_a_function_samples_is_among_its_reads(author: Any, gl: rg.Session) -> None:
+    author.node("""
+depth = Input(Depth, doc="Depth.")
+look = Function(ShadowLookup, shader="look.glsl", reads=(), doc="Shadow.")
+""")
+    author.node(
+        'look = Input(ShadowLookup, kind="function", doc="Shadow.")\ncolor = Output(Radiance, doc="All.")', "asks"
+    )
+    shadow = "float shadow(int light, vec3 position, vec3 normal) { return texelFetch(depth, ivec2(0), 0).r; }\n"
+    author.write(look__glsl="uniform sampler2D depth;\n" + shadow)
+    author.write(asks__frag="out vec4 color;\nvoid main() { color = vec4(shadow(0, vec3(0.0), vec3(0.0))); }\n")
+    text = TEXT.replace(", normal: gbuffer.normal", "").replace("a.color", "b.color")
+    text = text.replace("outputs:", "  b: {type: asks, inputs: {look: a.look}}\noutputs:")
+    for act in (author.pipeline(text).check, lambda: gl.render(author.pipeline(text))):
+        (said,) = author.said(act)
+        assert said.startswith("look.glsl:1:19: RG430 node 'b' (asks): ")
+        assert said.endswith(
+            "look.glsl of node 'a' samples 'depth', which is not among the `reads` of its Function; add it there"
+        )
