@@ -11,16 +11,17 @@ from pathlib import Path
 from typing import Any
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from rendergraph.catalog import Catalog
-from rendergraph.document import Document, YamlLimits, from_plain, parse, shown
+from rendergraph.document import Document, Source, YamlLimits, from_plain, parse, shown
 from rendergraph.edit import text as yaml_text
 from rendergraph.edit.text import DELETED
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.read import NAME, PIPELINE, read
 from rendergraph.resolve import resolve
 from rendergraph.resolve.files import Files
-from rendergraph.resolve.patches import TypeNames
+from rendergraph.resolve.patches import Setting, TypeNames, patch_of
 
 _FILE_KEYS = {key.name for key in PIPELINE.keys} - {"nodes", "outputs", "inputs", "parameters"}
 
@@ -29,7 +30,7 @@ class PipelineText(Struct, eq=False):
     """A pipeline file that is being edited.
 
     Attributes:
-        text: what has become of it; a method changes it, or raises an `InputError` that says what is wrong.
+        text: what has become of it. A method that raises an `InputError` may have left a part of its change behind.
         path: its file, to which what it names is relative.
         notes: what the changes took along, one line each.
     """
@@ -76,59 +77,41 @@ class PipelineText(Struct, eq=False):
 
     def connect(self, end: str, links: Sequence[str]) -> None:
         """Connect an input, `node.input`, or an output of the file, `outputs.name`."""
-        self._set(self._end(end), links[0] if len(links) == 1 else list(links))
+        if "inputs" not in (path := self._path(end, links[0])) and path[0] != "outputs":
+            raise _mistake("RG111", f"'{end}' is no input; what takes a value is set: set {end} VALUE")
+        self.set(end, links[0] if len(links) == 1 else list(links))
 
     def disconnect(self, end: str) -> None:
         """Remove the link of an input, or an output of the file."""
-        path = self._end(end)
-        if _at(self._whole(), path) is None:
+        if _at(self._whole(), self._path(end, None)) is None:
             raise _mistake("RG114", f"'{end}' is not connected")
-        self._set(path, DELETED)
+        self.set(end, None)
 
     def set(self, name: str, value: Any) -> None:
-        """Set a parameter, `node.param` or the name of one of the pipeline, or a key of the file; None unsets it."""
-        id, _, param = name.rpartition(".")
-        path: yaml_text.Path
-        if id:
-            node = self._node(id)
-            names = self._names(node.get("type"))
-            if param not in names.params:
-                is_input = f"; it is an input: connect {name} LINK"
-                hint = is_input if param in names.inputs else suggestion(param, sorted(names.params))
-                raise _mistake("RG103", f"{_of_type(node)} has no param '{shown(param)}'{hint}")
-            path = ("nodes", id, "params", param)
-        else:
-            parameters = _at(self._whole(), ("parameters",)) or {}
-            if name not in parameters and name not in _FILE_KEYS:
-                hint = suggestion(name, parameters) or "; write NODE.PARAM for one of a node"
-                raise _mistake("RG119", f"the pipeline has no parameter '{shown(name)}'{hint}")
-            path = ("parameters", name, "default") if name in parameters else (name,)
-        self._set(path, DELETED if value is None else value)
+        """Set what `-s` sets, an output of the file or one of its keys, such as `size`; None unsets it."""
+        self._set(self._path(name, value), DELETED if value is None else value)
 
     def retype(self, id: str, node_type: str) -> None:
         """Give a node another type; what this file gives it and the new type has not is dropped."""
-        self._node(id)
-        names = self._names(node_type)
+        path, names = self._path(f"{id}.type", node_type), self._names(node_type)
         for part, known in (("inputs", names.inputs), ("params", names.params)):
-            for name in set(_at(self._own(), ("nodes", id, part)) or ()) - known:
+            for name in sorted({*(_at(self._own(), ("nodes", id, part)) or ())} - known):
                 self.notes.append(f"'{node_type}' has no {part[:-1]} '{name}'; dropped")
                 self._set(("nodes", id, part, name), DELETED)
-        self._set(("nodes", id, "type"), node_type)
+        self._set(path, node_type)
 
     def disable(self, id: str) -> None:
         """Take a node out; nodes that read it read its input instead."""
-        self._node(id)
-        self._set(("nodes", id, "enabled"), False)
+        self.set(f"{id}.enabled", False)
 
     def enable(self, id: str) -> None:
         """Put a disabled node back."""
-        self._node(id)
         inherited = _at(self._inherited(), ("nodes", id, "enabled")) is False
-        self._set(("nodes", id, "enabled"), True if inherited else DELETED)
+        self._set(self._path(f"{id}.enabled", True), True if inherited else DELETED)
 
     def insert(self, id: str, node_type: str, end: str, port: str = "", out: str = "") -> None:
         """Put a new node into the link of an input or of an output of the file, through its ports `port` and `out`."""
-        path = self._end(end)
+        path = self._path(end, "node.port")
         link = _at(self._whole(), path)
         if not isinstance(link, str):
             raise _mistake("RG114", f"'{end}' has no single link that a node could be put into")
@@ -185,26 +168,34 @@ class PipelineText(Struct, eq=False):
         if id in (_at(self._whole(), ("nodes",)) or {}):
             raise _mistake("RG107", f"there is a node '{id}' already; choose another id")
 
-    def _names(self, node_type: Any) -> TypeNames:
-        document = self._document()
+    def _files(self) -> Files:
         files = Files(self.catalog, (), YamlLimits())
-        files.own(document)
-        names = files.names_of(from_plain(node_type, document.source))
+        files.own(self._document())
+        return files
+
+    def _names(self, node_type: Any) -> TypeNames:
+        names = self._files().names_of(from_plain(node_type, self._document().source))
         if names is None:
             hint = suggestion(str(node_type), self.catalog.names())
             raise _mistake("RG102", f"there is no node type '{shown(node_type)}'{hint}")
         return names
 
-    def _end(self, end: str) -> yaml_text.Path:
-        """Return the path of what `node.input` or `outputs.name` names."""
-        id, _, port = end.rpartition(".")
-        if id == "outputs":
-            return ("outputs", port)
-        node = self._node(id or end)
-        names = self._names(node.get("type"))
-        if port not in names.inputs:
-            raise _mistake("RG111", f"{_of_type(node)} has no input '{shown(port)}'{suggestion(port, names.inputs)}")
-        return ("nodes", id, "inputs", port)
+    def _path(self, name: str, value: Any) -> yaml_text.Path:
+        """Return the place of `node.param` and whatever else `-s` sets, of `outputs.name`, or of a key of the file."""
+        id, _, last = name.rpartition(".")
+        if id == "outputs" or (not id and name in _FILE_KEYS):
+            return ("outputs", last) if id else (name,)
+        settings = [Setting((), id or None, last, from_plain(value, Source(name)), f"{name}={value}")]
+        patch, problems = patch_of(
+            resolve(self._document(), catalog=self.catalog).tree, settings, self._files().names_of
+        )
+        if problems or patch is None:
+            raise InputError([replace(problem, place=None) for problem in problems])
+        path: yaml_text.Path = ()
+        while isinstance(patch.data, dict) and len(path) < (4 if id and last not in ("type", "enabled") else 3):
+            ((step, patch),) = patch.data.items()
+            path = (*path, step)
+        return path
 
     def _links(self) -> Iterator[tuple[yaml_text.Path, Any]]:
         """Yield the links that this file has itself, with their places."""
@@ -248,7 +239,3 @@ def _at(data: Any, path: Iterable[Any]) -> Any:
 
 def _source(link: Any) -> str:
     return str(link).partition("@")[0].partition(".")[0]
-
-
-def _of_type(node: Mapping[str, Any]) -> str:
-    return f"node type '{node['type']}'" if isinstance(node.get("type"), str) else "the sub-pipeline"
