@@ -38,7 +38,7 @@ def find_llvm() -> tuple[str, str]:
     program = shutil.which("ldconfig") or "/sbin/ldconfig"
     try:
         listed = subprocess.run([program, "-p"], capture_output=True, text=True, timeout=10, check=False).stdout
-    except (OSError, subprocess.SubprocessError):
+    except (OSError, ValueError, subprocess.SubprocessError):
         listed = ""
     found = [(int(old or new), path) for old, new, path in _LIBRARY.findall(listed)]
     number, path = max(found, default=(0, ""))
