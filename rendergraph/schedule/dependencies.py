@@ -171,12 +171,14 @@ def dependencies(
                 mine.setdefault(reader, (write.resource, "overwrites"))
         mine.pop(step.key, None)
     if len(upstream_first(waits)) < len(waits):
-        raise InputError(list(dict.fromkeys(_cycles(waits, overwritten))))
+        raise InputError(list(dict.fromkeys(_cycles(waits, overwritten, {step.key: step for step in kept}))))
     return waits
 
 
 def _cycles(
-    waits: dict[StepKey, dict[StepKey, tuple[str, str]]], overwritten: Mapping[tuple[str, str], Problem]
+    waits: dict[StepKey, dict[StepKey, tuple[str, str]]],
+    overwritten: Mapping[tuple[str, str], Problem],
+    steps: Mapping[StepKey, Step],
 ) -> Iterator[Problem]:
     """Yield the problem of a cycle, then of those that are left without what that one is about."""
     from graphlib import CycleError, TopologicalSorter  # to name a cycle where there is one
@@ -190,7 +192,7 @@ def _cycles(
             return
         known = [edge for edge in edges if (edge[0][0], edge[1][0]) in overwritten and _overwrites(waits, edge)]
         if not known:
-            yield _cycle(waits, edges)
+            yield _cycle(waits, edges, steps)
             return
         yield overwritten[known[0][0][0], known[0][1][0]]
         del waits[known[0][1]][known[0][0]]
@@ -309,10 +311,13 @@ def _loads_nothing(step: Step, resource: str) -> Problem:
     return step.problem("RG603", text)
 
 
-def _cycle(waits: Waits, edges: Sequence[tuple[StepKey, StepKey]]) -> Problem:
+def _cycle(waits: Waits, edges: Sequence[tuple[StepKey, StepKey]], steps: Mapping[StepKey, Step]) -> Problem:
     # An edge that only keeps a reader ahead of an overwriter is what the user can change: start the cycle there.
     start = next((i for i, edge in enumerate(edges) if _overwrites(waits, edge)), 0)
-    (reader, _), (writer, _) = edges[start]
+    one, other = edges[start]
+    reader, writer = one[0], other[0]
+    if reader == writer:
+        reader, writer = (f"{key[0]}[{f'{key[1]} {steps[key].label}'.rstrip()}]" for key in (one, other))
     resource, _ = waits[edges[start][1]][edges[start][0]]
     back = edges[(start + 1) % len(edges)]
     needed, _ = waits[back[1]][back[0]]
@@ -321,4 +326,5 @@ def _cycle(waits: Waits, edges: Sequence[tuple[StepKey, StepKey]]) -> Problem:
         f"'{reader}' must run before '{writer}', which overwrites '{resource}', but also after it, "
         f"as it depends on '{needed}'; let '{reader}' take '{resource}' from '{writer}' "
         f"or the rest from before it",
+        steps[one].where.place,
     )

@@ -246,3 +246,32 @@ outputs: {image: late.composed}
 """
     (one,) = said(bench, text)
     assert one.startswith("test.yaml:8:64: RG128 'late.lit' reads 'light.radiance', but 'late' also needs ")
+
+
+class Twisted(Node):
+    """Reads what it overwrites before, and needs what is made of that."""
+
+    radiance = InOut(Radiance, doc="What is overwritten.")
+    lit = Input(Radiance, doc="What is made of `first`.")
+    first = Output(like="radiance", doc="A copy.")
+    last = Output(like="radiance", doc="Another.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("scale.frag", source=self.radiance, out={"prepared": self.first}, gain=1.0)
+        steps.clear(self.radiance.mip(0), 0.25)
+        steps.fullscreen("scale.frag", source=self.lit, out={"prepared": self.last}, gain=1.0)
+
+
+def test_a_reader_of_what_a_step_of_its_source_overwrites(bench: Any, gl: rg.Session) -> None:
+    """It runs between the two steps of that node; judged by nodes there would be no order."""
+    text = """nodes:
+  ground: {type: ground}
+  twisted: {type: twisted, inputs: {radiance: ground.color, lit: other.radiance}}
+  other: {type: light, inputs: {prepared: twisted.first}}
+  third: {type: bracket, inputs: {source: ground.color, lit: other.radiance}}
+outputs: {image: twisted.last, third: third.composed}
+"""
+    frame = gl.render(bench.pipeline(text, *NODES, Twisted, shaders=SHADERS), taps=["twisted.radiance"])
+    np.testing.assert_array_equal(frame["image"][0, :, 0], 5 * X[0])
+    np.testing.assert_array_equal(frame["third"][0, :, 0], 5 * X[0] + 0.5 * X[0] + 2)
+    assert (frame["twisted.radiance"] == 0.25).all()
