@@ -49,7 +49,7 @@ _Part: TypeAlias = Annotated[float, Range(-1, 1)]
 _Offset: TypeAlias = Annotated[tuple[_Part, _Part], "x and y in texels, from -1 to 1"]
 
 
-_CHANGES = {"camera": "", **SCENE_CHANGES}
+_CHANGES = {"camera": "", "parameters": "", "size": "", **SCENE_CHANGES}
 
 
 class StepTime(Struct, frozen=True):
@@ -138,7 +138,7 @@ class FrameContext(Struct, eq=False):
                 raise Misuse(f"changed is given {quoted(word)}{suggestion(str(word), _CHANGES, most=5)}", "RG433")
         now, before = self.executable.scene.changes, self.executable.changes_seen
         return self.is_first or any(
-            self.moved() if word == "camera" else now[_CHANGES[word]] != before.get(_CHANGES[word], 0)
+            self.moved() if word == "camera" else now[_CHANGES[word]] != before.get(_CHANGES[word], 0)  # "" never
             for word in what or _CHANGES
         )
 

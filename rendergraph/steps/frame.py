@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 
-Change: TypeAlias = Literal["camera"] | SceneSource
+Change: TypeAlias = Literal["camera", "parameters", "size"] | SceneSource
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,8 +163,9 @@ class Frame(Protocol):
         """Whether something has changed since the frame before; true in the first frame.
 
         Args:
-            what: `camera` (where it is, its lens and the size, without jitter), `transforms`, `lights`, `materials`,
-                `environment`; all of them if nothing is given. After a change of a parameter frames begin anew.
+            what: `camera` (where it is and its lens, without jitter), `transforms`, `lights`, `materials`,
+                `environment`, `parameters`, `size`; all of them if nothing is given. After a change of parameters or
+                size the next frame is a first one.
         """
         ...
 

@@ -108,6 +108,12 @@ CALLS = {
     'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"3f in_position": self.small})': "RG423 attributes['3f in_position'] is the Internal 'small', which is not a buffer",
     'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes=[self.numbers])': "RG423 attributes is [Internal('numbers')], not a mapping from "
     "layouts to buffers or None",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, count=self.numbers)': "RG423 count is given without commands; give vertices=BUFFER, or instances=BUFFER",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=self.numbers, instances=self.numbers)': "RG423 both vertices and instances are buffers; a command holds its number of instances",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, instances=self.small)': "RG423 instances is the Internal 'small', which is not a buffer",
+    'steps.geometry("wrong.frag", commands=self.small)': "RG423 commands is the Internal 'small', which is not a buffer",
+    'steps.geometry("wrong.frag", commands="numbers")': "RG423 commands is the text 'numbers'; give the port itself, self.numbers",
+    'steps.geometry("wrong.frag", commands=self.numbers, topology="triangles_adjacency")': "RG423 both commands and topology='triangles_adjacency' are given; commands draw triangles in the scene's order",
     # compute
     'steps.compute("a.comp", groups=(1, 0, 1), out=self.small)': "RG423 groups is (1, 0, 1), not one to three whole numbers from 1 up",
     'steps.compute("a.comp", groups=(16 / 8, 1, 1), out=self.small)': "RG423 groups is (2.0, 1, 1), not one to three whole numbers from 1 up; divide with //",
