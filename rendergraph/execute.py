@@ -186,6 +186,7 @@ class Runner(Struct, eq=False):
     _jittering: GraphNode | None = None
     _seen: tuple[Scene, ViewMatrices] | None = None
     _still: int = 0
+    _time: float = 0.0
     drawn: int = 0
 
     def __post_init__(self) -> None:
@@ -235,10 +236,7 @@ class Runner(Struct, eq=False):
         """
         executable, views = self.executable, self.executable.views
         start = perf_counter()
-        moved_from = self._seen
-        self._count_still(scene, camera)
-        if executable.reads_frame and views.set_frame(time, delta, index, self._still):
-            executable.touched.add("frame_block")
+        moved_from, self._seen = self._seen, (scene, camera)
         if self.drawn:
             views.advance()
         camera = self._jittered(camera)
@@ -259,6 +257,10 @@ class Runner(Struct, eq=False):
         if executable.uploads:
             self._compute_uploads()
         executable.end_updates()
+        if executable.reads_frame:
+            self._count_still(moved_from, time)
+            if views.set_frame(time, delta, index, self._still):
+                executable.touched.add("frame_block")
         if not self._complete:
             self._check_views()
         if not self.drawn:
@@ -330,11 +332,12 @@ class Runner(Struct, eq=False):
             call()
         self.executable.fresh = False
 
-    def _count_still(self, scene: Scene, camera: ViewMatrices) -> None:
-        """How many frames nothing has moved: neither scene nor camera, nor a parameter that was changed meanwhile."""
-        before, self._seen = self._seen, (scene, camera)
-        still = before is not None and before[0] is scene and not self.executable.fresh
-        self._still = self._still + 1 if still and not _has_moved(before, self._seen) else 0
+    def _count_still(self, before: tuple[Scene, ViewMatrices] | None, time: float) -> None:
+        """How many frames nothing has moved: scene, camera, parameters, what nodes write, and what time moves."""
+        executable, time_before, self._time = self.executable, self._time, time
+        still = before is not None and self._seen is not None and before[0] is self._seen[0] and not executable.fresh
+        still = still and not _has_moved(before, self._seen) and not executable.was_updated
+        self._still = self._still + 1 if still and (time == time_before or not executable.moves_with_time) else 0
 
     def _jittered(self, camera: ViewMatrices) -> ViewMatrices:
         """The camera with its picture moved as far as a node asks for."""

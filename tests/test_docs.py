@@ -269,6 +269,9 @@ def test_every_function_of_the_shared_includes_is_explained(monkeypatch: pytest.
             missing += [f"{file.name}: {one.declaration}: {unknown}"] if unknown or not one.comment else []
     assert not missing
     assert found > 80
+    for file in (ROOT / "shaders" / "include").glob("*/*.glsl"):
+        assert f"| `{file.parent.name}/{file.name}` |" in page
+        assert includes.header(file.read_text(encoding="utf-8")), f"{file.name} does not begin with a comment"
 
 
 def test_what_the_page_says_of_a_function_is_in_its_file(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,7 +28,7 @@ GROUPS = {
         "shading lighting lights radiance air environment_lighting environment equirectangular cube brdf "
         "anisotropic_ggx disc_form_factor"
     ),
-    "The scene as data": "scene previous_scene",
+    "The scene as data": "scene previous_scene trace",
     "Vertex shaders": "transform geometry_vertex material_vertex mask_vertex",
     "Colour and numbers": ("srgb luminance color_temperature layer_colors math noise hammersley downsample text"),
 }
@@ -54,6 +54,9 @@ ARGUMENTS = {
     "light": "index of a light in `lights`, a `Light`, or a `ReflectedLight`: its diffuse and specular radiance",
     "instance, triangle, vertex": "numbers: of an object of the scene, a triangle of its mesh, a vertex of the scene",
     "barycentrics": "weights of the second and the third vertex of a triangle",
+    "origin, nearest, farthest": "of a ray: where it begins, in world space; distances in lengths of its direction",
+    "hit": "a `Hit`: what a ray has met",
+    "wanted, rejected": "flags of instances, such as `SCENE_CASTS_SHADOW`: all must be set, or none",
 }
 """What an argument of a name is in every shared include; other arguments are explained at their functions."""
 
@@ -84,9 +87,22 @@ def pages() -> Iterator[tuple[str, str]]:
         "without being included. Lengths are in metres, angles in radians and radiance in scene-linear Rec. 709, where "
         "nothing else is said. [GLSL](../glsl.md) explains programs, names, macros and views."
     )
+    parts += ["## Choices of a parameter", _choices()]
     rows = [(", ".join(map(code, names.split(", "))), prose(meaning)) for names, meaning in ARGUMENTS.items()]
     arguments = "Arguments of these names mean the same everywhere:\n\n" + table(("argument", "is"), rows)
     yield "includes.md", page("Shared includes", about, arguments, *parts)
+
+
+def _choices() -> str:
+    """The includes of which `#include <SHADING>` and `#include <CURVE>` take one."""
+    files = sorted((folder("rendergraph.shaders") / "include").glob("*/*.glsl"))
+    texts = {path: path.read_text(encoding="utf-8") for path in files}
+    rows = [(code(f"{path.parent.name}/{path.name}"), prose(header(text))) for path, text in texts.items()]
+    declared = dict.fromkeys(functions(text)[-1].declaration for text in texts.values())
+    about = (
+        "A node includes the file of the choice that its parameter has; each defines the function that the node calls"
+    )
+    return f"{about}: {' or '.join(map(code, declared))}.\n\n" + table(("file", ""), rows)
 
 
 def _file(path: Path) -> str:

@@ -26,10 +26,10 @@ def pages() -> Iterator[tuple[str, str]]:
     ]
     functions = [
         (
-            f"`{s.declaration}`",
-            prose(s.doc),
-            code(s.neutral),
-            code(s.combine),
+            "<br>".join(code(each.declaration) for each in s.functions),
+            "<br>".join(prose(each.doc) for each in s.functions),
+            code(s.neutral) if s.combine else "not defined",
+            code(s.combine) if s.combine else "only one provider",
             _linked(types, s.name, "outputs"),
             _linked(types, s.name, "inputs"),
         )

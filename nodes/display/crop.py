@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from rendergraph.api import Any, Input, Node, Output, SceneError, Steps, View
+from rendergraph.api import Any, Input, Node, Output, SceneError, Steps, Velocity, View
 
-from ..geometry._velocity import Velocity
 from ._texel_types import texel_macros
 
 

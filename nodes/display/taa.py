@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rendergraph.api import Depth, DisplayColor, History, Input, Node, Output, Steps, param
-
-from ..geometry._velocity import Velocity
+from rendergraph.api import Depth, DisplayColor, History, Input, Node, Output, Steps, Velocity, param
 
 _FIRST_INDEX = 1897
 """The start of the sequence. Of the first 2,500 indices, it is the one for which the first 8 and 16 frames, together

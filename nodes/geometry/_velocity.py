@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from rendergraph.api import Output, Semantic
+from rendergraph.api import Output, Velocity
 
 from ._samples import own_samples
-
-Velocity = Semantic(
-    "velocity",
-    "Screen-space motion since the previous frame, in widths and heights of the picture, without jitter.",
-)
 
 
 def velocity_output() -> Output:

@@ -29,6 +29,8 @@ class Interreflection(DirectionalSampling):
     second node takes the `reflected` of the first as its `diffuse`, and continues its `radiance`.
     """
 
+    twin = None
+
     depth = Input(Depth, group="gbuffer", doc="Window depth; positions come from it and its view.")
     normal = Input(Normal, group="gbuffer", doc="Unit normal, world space.")
     albedo = Input(AlbedoRoot, group="gbuffer", doc="Square root of the base colour, which is the diffuse reflectance.")

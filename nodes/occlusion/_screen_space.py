@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from rendergraph.api import (
     Depth,
@@ -35,6 +35,8 @@ class ScreenSpaceOcclusion(Node):
     `record` calls `gather_surfaces` first, then computes occlusion at the reduced size, and passes it to `upsample` if
     that is not the picture's size.
     """
+
+    twin: ClassVar[str | None] = "traced_occlusion"
 
     depth = Input(Depth, doc="Window depth; positions come from it and its view.")
     normal = Input(Normal, doc="Unit normal, world space.")

@@ -5,9 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from rendergraph.api import Any as AnyTexel
-from rendergraph.api import Depth, History, Input, Node, Normal, Output, Steps, param
-
-from ..geometry._velocity import Velocity
+from rendergraph.api import Depth, History, Input, Node, Normal, Output, Steps, Velocity, param
 
 
 class Accumulate(Node):

@@ -26,6 +26,8 @@ class MapTechnique(Node):
     `record` first records steps that prepare internal textures, then calls `super().record(steps)`.
     """
 
+    twin = "traced_shadows"
+
     shadow_map = Input(ShadowMap, kind="texture2d_array", size="any", compare=True, doc="Depth from the lights.")
     depth = Input(Depth, optional=True, doc="Depth of the picture, for `visibility`.")
     lookup: ClassVar[Function]

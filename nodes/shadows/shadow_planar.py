@@ -48,6 +48,8 @@ class ShadowPlanar(Casting):
     twice.
     """
 
+    twin = "traced_shadows"
+
     depth = Input(Depth, doc="Depth of the opaque surfaces.")
     marks = Internal(Depth, format="depth32f_stencil8", clear=0.0)
     projections = Internal(kind="buffer", bytes=lambda node, facts: 80 * max(1, len(node.lights(facts))))

@@ -15,6 +15,8 @@ class ShadowVolumes(CountsVolumes):
     light. Casters must be closed meshes; alpha masks are ignored.
     """
 
+    twin = "traced_shadows"
+
     depth = Input(Depth, doc="Depth of the opaque surfaces, from the pipeline's camera.")
     marks = Internal(Depth, format="depth32f_stencil8", clear=0.0)
     visibility = visibility_of_lights()

@@ -66,6 +66,7 @@ from rendergraph.textures import ShadowLookup as ShadowLookup
 from rendergraph.textures import ShadowMap as ShadowMap
 from rendergraph.textures import Signature as Signature
 from rendergraph.textures import TextureDesc as TextureDesc
+from rendergraph.textures import Velocity as Velocity
 from rendergraph.textures import View as View
 from rendergraph.textures import Visibility as Visibility
 from rendergraph.textures import full_mip_count as full_mip_count

@@ -20,7 +20,7 @@ from rendergraph.compile.reuse import Reuse, Source
 from rendergraph.expand import CAMERA
 from rendergraph.gl.programs import Program
 from rendergraph.gl.state import Pieces, changes
-from rendergraph.program import prefix, used_blocks
+from rendergraph.program import prefix, used_blocks, used_names
 from rendergraph.schedule.dependencies import StepKey, touched_ids
 from rendergraph.steps import Read, Step, UniformValue
 
@@ -378,6 +378,25 @@ class Executable(Struct, eq=False, dict=True):
     def reads_frame(self) -> bool:
         draws = (draw for step in self.steps[0] for draw in step.all_draws)
         return any("frame_block" in draw.program.block_names for draw in draws)
+
+    @cached_property
+    def moves_with_time(self) -> bool:
+        """Whether some program moves something by the time.
+
+        Full-screen steps that adapt to light look at `delta_time`, and move nothing.
+        """
+        for step in self.steps[0]:
+            names = {"time"} if step.step.kind == "fullscreen" else {"time", "delta_time"}
+            for draw in step.all_draws:
+                texts = draw.program.texts.values() if "frame_block" in draw.program.block_names else ()
+                if any(not names.isdisjoint(used_names(text)) for text in texts):
+                    return True
+        return False
+
+    @property
+    def was_updated(self) -> bool:
+        """Whether nodes have given buffers or uniforms other values since the frame before."""
+        return any(isinstance(source, tuple) and source[0] in ("buffer", "step") for source in self.touched)
 
     def assemble(self) -> None:
         """Make the flat lists of calls from the steps' draws, leaving out what changes nothing."""

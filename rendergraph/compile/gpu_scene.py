@@ -27,7 +27,7 @@ from rendergraph.scene.animate import moving_plugin_keys
 from rendergraph.scene.facts import Decode
 from rendergraph.scene.model import ImageSource, MadeImage, Scene, Texture, changed_objects
 from rendergraph.scene.pack import PackedScene, Records
-from rendergraph.scene.scene_data import data_macros, instance_data, used_textures
+from rendergraph.scene.scene_data import data_macros, place_instances, used_textures
 from rendergraph.scene.tree_data import MeshTrees, mesh_trees, object_rows
 from rendergraph.textures import TextureDesc, full_mip_count
 
@@ -148,7 +148,7 @@ class GpuScene(Struct, eq=False, dict=True):
                 self._stale_instances.update(moved.tolist())
                 self.changes["instances"] += 1
                 if self._data is not None:
-                    self._data.instances = instance_data(scene, packed)
+                    place_instances(self._data.instances, scene, packed, moved)
                     write_records(self._data.buffers["scene_instance_block"], self._data.instances, moved)
                 if self._tree is not None:
                     trees, buffer = self._tree

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from rendergraph.declare.parameters import Parameter, define, param, structural
 from rendergraph.errors import Misuse, suggestion
-from rendergraph.ports import Function, InOut, Input, Output, Port, Views
+from rendergraph.ports import Function, InOut, Input, Output, Port, Views, WrittenPort
 from rendergraph.steps import Frame, Steps
 from rendergraph.typecheck import hints_of, quoted
 
@@ -80,8 +80,11 @@ class Node:
     def record(self, steps: Steps) -> None:
         """Append the steps of this pass; called before the schedule and without GL.
 
-        By default one full-screen step, or one dispatch over the first texture that is written or else read.
+        By default one full-screen step, or one dispatch over the first texture that is written or else read; none if
+        the node writes nothing, as one that only provides a function.
         """
+        if not any(isinstance(port, WrittenPort) for port in steps.ports.values()):
+            return
         shader = self.shader or f"{steps.type_name}.frag"
         if shader.endswith(".comp"):
             steps.compute(shader)

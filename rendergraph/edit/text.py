@@ -203,9 +203,8 @@ def _insert(text: str, parent: Span, key: Any, value: Any) -> str:
         at = _line(text, last)[1]
         return text[:at] + "".join(newline + line for line in lines) + text[at:]
     before = text[_line(text, children[-1].first)[0] : children[-1].first]
-    gap = " " if text[last - 1] == ":" else ""  # its value is not written
     between = newline + before if len(children) > 1 and not before.strip() else " "
-    return text[:last] + gap + "," + between + entry + text[last:]
+    return text[:last] + "," + between + entry + text[last:]
 
 
 def _entry(key: Any, value: Any, indent: int) -> Iterator[str]:

@@ -23,6 +23,7 @@ from rendergraph.program.checks import named_reads as named_reads
 from rendergraph.program.checks import unfit_outputs as unfit_outputs
 from rendergraph.program.checks import unfit_sampler as unfit_sampler
 from rendergraph.program.checks import used_blocks as used_blocks
+from rendergraph.program.checks import used_names as used_names
 from rendergraph.program.text import StageText as StageText
 from rendergraph.program.text import StepTexts as StepTexts
 from rendergraph.program.text import positions_macro as positions_macro

@@ -242,10 +242,14 @@ def _kept(step: Step, resources: Mapping[str, Resource]) -> str | None:
     return next((write.resource for write in step.writes if resources[write.resource].role == "kept"), None)
 
 
+used_names = lru_cache(maxsize=256)(reachable_names)
+"""The names that `main` of a program text reaches."""
+
+
 @lru_cache(maxsize=256)
 def used_blocks(text: str) -> frozenset[str]:
     """Return the blocks of which `main` of a program text, or what it calls, uses a member."""
-    names = reachable_names(text)
+    names = used_names(text)
     return frozenset(block for _, block, members in declared_blocks(text) if not names.isdisjoint(members))
 
 

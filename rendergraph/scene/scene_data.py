@@ -191,19 +191,26 @@ def vertex_data(packed: PackedScene) -> npt.NDArray[np.float32]:
 def instance_data(scene: Scene, packed: PackedScene) -> Records:
     """Return an `INSTANCE_DATA` record for each object."""
     records = np.zeros(len(scene.objects), INSTANCE_DATA)
-    records["rows"] = packed.instances["rows"]
-    records["material"], records["mesh"] = packed.instances["ids"][:, 0], packed.object_mesh
-    records["flags"] = [_flags(scene, number, packed) for number in range(len(scene.objects))]
+    records["mesh"] = packed.object_mesh
     meshes = packed.meshes[packed.object_mesh]
     for name in ("first_index", "base_vertex"):
         records[name] = meshes[name]
     records["triangles"] = meshes["count"] // 3
-    records["box_center"][:, :3], records["box_extent"][:, :3] = packed.centers, packed.extents + packed.slack
     records["first_emitter"] = -1
     emitting = emitting_objects(scene)
     counts = records["triangles"][emitting]
     records["first_emitter"][emitting] = np.cumsum(counts) - counts
+    place_instances(records, scene, packed, np.arange(len(records)))
     return records
+
+
+def place_instances(records: Records, scene: Scene, packed: PackedScene, numbers: npt.NDArray[np.int64]) -> None:
+    """Write what depends on where these objects are, and on their material, into their `INSTANCE_DATA` records."""
+    records["rows"][numbers] = packed.instances["rows"][numbers]
+    records["material"][numbers] = packed.instances["ids"][numbers, 0]
+    records["flags"][numbers] = [_flags(scene, number, packed) for number in numbers]
+    records["box_center"][numbers, :3] = packed.centers[numbers]
+    records["box_extent"][numbers, :3] = packed.extents[numbers] + packed.slack[numbers]
 
 
 def _flags(scene: Scene, number: int, packed: PackedScene) -> int:

@@ -15,6 +15,7 @@ struct Hit {
 const int TRACE_UP = 0x7ffffffe;   // on the stack: back from a mesh to the tree over objects
 const int TRACE_END = 0x7fffffff;  // nothing is left
 
+// 1 / d for each component of `d`, and a large number of its sign where it is almost 0.
 vec3 trace_inverse(vec3 d) {
     vec3 least = mix(vec3(1e-30), vec3(-1e-30), lessThan(d, vec3(0.0)));
     return 1.0 / mix(d, least, lessThan(abs(d), vec3(1e-30)));
@@ -127,6 +128,7 @@ bool trace(vec3 origin, vec3 direction, float nearest, float farthest, int wante
 }
 
 #ifdef SCENE_ANY_MASKED
+// Whether an alpha mask has cut away the surface at a hit.
 bool trace_is_cut_away(Hit hit) {
     float cutoff = materials[MATERIAL_INDEX(scene_instances[hit.instance].material)].emissive.a;
     return scene_has(hit.instance, SCENE_MASKED) && scene_alpha(hit.instance, hit.triangle, hit.barycentrics) < cutoff;

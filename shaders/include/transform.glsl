@@ -52,12 +52,26 @@ vec4 world_to_clip(vec3 position) {
     return PASS_VIEW.view_projection * vec4(position, 1.0);
 }
 
-// Writes the clip-space positions in this frame and the previous one, for `fragment_velocity()`.
-void write_velocity_varyings() {
+// World-space position in the previous frame of a point `p` of the object; in a pass without velocity, in this frame.
+vec3 previous_object_to_world(vec3 p) {
 #ifdef WRITES_VELOCITY
-    vec4 q = vec4(in_position, 1.0);
-    vec3 previous_position = vec3(dot(in_previous0, q), dot(in_previous1, q), dot(in_previous2, q));
-    v_clip_position = world_to_clip(object_to_world(in_position));
+    vec4 q = vec4(p, 1.0);
+    return vec3(dot(in_previous0, q), dot(in_previous1, q), dot(in_previous2, q));
+#else
+    return object_to_world(p);
+#endif
+}
+
+// Writes the clip-space positions in this frame and the previous one, for `fragment_velocity()`. `position` and
+// `previous_position` are where the vertex is and was in world space; a vertex shader that moves vertices calls it so.
+void write_velocity_varyings(vec3 position, vec3 previous_position) {
+#ifdef WRITES_VELOCITY
+    v_clip_position = world_to_clip(position);
     v_previous_clip_position = PREVIOUS_PASS_VIEW.view_projection * vec4(previous_position, 1.0);
 #endif
+}
+
+// The same of a vertex that moves with its object alone.
+void write_velocity_varyings() {
+    write_velocity_varyings(object_to_world(in_position), previous_object_to_world(in_position));
 }

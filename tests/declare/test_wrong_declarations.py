@@ -28,6 +28,7 @@ DECLARATIONS = {
     'more = Output("radiance", doc="D.")  # here': "port 'more': semantic is 'radiance', not a Semantic such as Radiance or None",
     'more = Input("radiance", doc="D.")  # here': "port 'more': semantic is 'radiance', not a Semantic such as Radiance or a Signature such as ShadowLookup",
     'more = Input(Radiance, kind="function", doc="D.")  # here': "port 'more': semantic is the Semantic 'radiance', not a Signature such as ShadowLookup",
+    'more = Input(Air, kind="function", many=True, doc="D.")  # here': "port 'more' takes a list, but air_at() of several nodes cannot be joined",
     'more = Output(doc="D.")  # here': "port 'more' has neither a semantic nor `like`",
     'more = Input(Radiance, kind="texture", doc="D.")  # here': "port 'more': kind is 'texture'; did you mean 'texture3d'?",
     'more = Input(Radiance, filter="bilinear", doc="D.")  # here': "port 'more': filter is 'bilinear'; did you mean 'linear'?",

@@ -8,6 +8,7 @@ import re
 from collections import Counter
 from typing import Any
 
+import pytest
 import yaml
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -15,6 +16,61 @@ from hypothesis import strategies as st
 from rendergraph.document import parse
 from rendergraph.edit.text import DELETED, edit, rename
 from rendergraph.errors import InputError
+
+CASES = {
+    "add with the file's line break": ("a: 1\r\nb: 2  # c\r\n", ("n",), 3, "a: 1\r\nb: 2  # c\r\nn: 3\r\n"),
+    "add without a last line break": ("a: {b: 1}\nc: 2", ("n",), [1], "a: {b: 1}\nc: 2\nn: [1]"),
+    "add before blank lines": (
+        "a:\n    b: |\n      text\n\n\n# end\n",
+        ("a", "n"),
+        1,
+        "a:\n    b: |\n      text\n    n: 1\n\n\n# end\n",
+    ),
+    "add behind a text that keeps them": (
+        "a:\n  b: |+\n    x\n\nc: 1\n",
+        ("a", "n"),
+        1,
+        "a:\n  b: |+\n    x\n\n  n: 1\nc: 1\n",
+    ),
+    "add to braces": ("a: {b: 1,  c: }\n", ("a", "n"), 1, "a: {b: 1,  c: , n: 1}\n"),
+    "add to empty braces": ("a: { }\n", ("a", "n"), "x", "a: {n: x }\n"),
+    "add a line in braces": (
+        "a: {\n  b: 1,\n  c: 2  # c\n}\n",
+        ("a", "n"),
+        1,
+        "a: {\n  b: 1,\n  c: 2,\n  n: 1  # c\n}\n",
+    ),
+    "add in place of a null": ("a:  # c\nb: 1\n", ("a", "n", "m"), 1, "a: {n: {m: 1}}  # c\nb: 1\n"),
+    "add in a list": ("a:\n  - b: 1\n    c: 2\n", ("a", 0, "n"), 3, "a:\n  - b: 1\n    c: 2\n    n: 3\n"),
+    "replace in a list": ("a: [x, y,  z]\n", ("a", 1), "w", "a: [x, w,  z]\n"),
+    "replace lines": ("a:  # keep\n  # inside\n  b: 1  # x\nc: 2\n", ("a",), 5, "a: 5  # keep\n  # inside\nc: 2\n"),
+    "replace lines at the end": ("c: 2\na:\n  b: 1", ("a",), 5, "c: 2\na: 5"),
+    "replace a text": ("a: |  \n  x\n\nb: 1\n", ("a",), "é: 😀", 'a: "é: 😀"\n\nb: 1\n'),
+    "delete a line": ("a: 1\n# of b\nb: 2  # too\nc: 3\n", ("b",), None, "a: 1\n# of b\nc: 3\n"),
+    "delete the last line": ("a: 1\r\nb: 2", ("b",), None, "a: 1"),
+    "delete the only entry": ("a:\n  b: 1\nc: 2\n", ("a", "b"), None, "a: {}\nc: 2\n"),
+    "delete beside a dash": ("a:\n  - b: 1\n    c: 2\n", ("a", 0, "b"), None, "a:\n  - c: 2\n"),
+    "delete the first in braces": ("a: {b: 1,  c: 2}\n", ("a", "b"), None, "a: {c: 2}\n"),
+    "delete before a comment": ("a: {b: 1, # c\n  d: 2}\n", ("a", "b"), None, "a: { # c\n  d: 2}\n"),
+    "delete the last in braces": ("a: {b: 1, # c\n  d: 2 }\n", ("a", "d"), None, "a: {b: 1 # c\n }\n"),
+    "delete before a last comma": ("a: {b: 1, d: 2,}\n", ("a", "d"), None, "a: {b: 1, }\n"),
+    "delete before a leading comma": ("a: {b: 1 # c\n  , d: 2}\n", ("a", "b"), None, "a: {d: 2}\n"),
+    "delete below an alias": ("a: &x {b: 1, c: 2}\nd: *x\n", ("d", "b"), None, "a: &x {b: 1, c: 2}\nd: {c: 2}\n"),
+    "set below an alias": ("a: &x {b: 1}\nd: *x\n", ("d", "b"), 2, "a: &x {b: 1}\nd: {b: 2}\n"),
+    "replace an anchor nobody uses": ("a: &x {b: 1}\n", ("a",), 2, "a: 2\n"),
+    "replace in any script": ("日本: {größe: 1}  # 😀\n", ("日本", "größe"), 2, "日本: {größe: 2}  # 😀\n"),
+}
+
+
+@pytest.mark.parametrize(("text", "path", "value", "after"), CASES.values(), ids=CASES)
+def test_an_edit_by_example(text: str, path: tuple[Any, ...], value: Any, after: str) -> None:
+    assert edit(text, path, DELETED if value is None else value) == after
+
+
+def test_a_key_by_example() -> None:
+    assert rename('a: {"b":1}  # c\n', ("a", "b"), "n") == 'a: {"n":1}  # c\n'
+    assert rename("? a\n: 1\n'b': 2\n", ("b",), "n") == "? a\n: 1\nn: 2\n"
+
 
 # --- texts of every style ---------------------------------------------------------------------------------------------
 
@@ -48,6 +104,12 @@ class Writer:
             return str(self.pick("null", "~", *([] if key or flow else [""])))
         return {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
 
+    def entry(self, name: str, value: Any) -> str:
+        key = self.scalar(name, key=True)
+        if value is None and self.pick(True, False):
+            return f"{key}: "
+        return key + (":" if key[0] == '"' and self.pick(True, False) else ": ") + self.flow(value)
+
     def comment(self) -> str:
         return str(self.pick("", "", "", "  # ein Rest: {x}, [y]", " # c"))
 
@@ -57,7 +119,7 @@ class Writer:
     def flow(self, value: Any) -> str:
         gap = self.pick("", "", " ", self.newline + "        ", f" # in, [side]{self.newline}        ")
         if isinstance(value, dict):
-            inner = f",{gap or ' '}".join(f"{self.scalar(k, key=True)}: {self.flow(v)}" for k, v in value.items())
+            inner = f",{gap or ' '}".join(self.entry(*item) for item in value.items())
             end = self.pick("", " ", ",") if value else self.pick("", " ")
             return f"{{{gap}{inner}{end}}}"
         if isinstance(value, list):
@@ -171,6 +233,7 @@ def test_an_entry_is_added_and_nothing_is_lost(document: tuple[str, dict[str, An
     assert repr(plain(after)) == repr(expected)
     removed, _, _ = lost(text, after)
     assert removed == ""
+    assert after.count("\r") == (after.count("\n") if "\r" in text else 0)
 
 
 def plain_at(tree: Any, path: tuple[Any, ...]) -> Any:
@@ -220,19 +283,20 @@ def test_a_key_is_renamed_and_nothing_else(document: tuple[str, dict[str, Any]],
     for step in path[:-1]:
         node = next(v for k, v in node.value if k.value == str(step))
     key = next(k for k, _ in node.value if k.value == str(path[-1]))
-    assert after == text[: key.start_mark.index] + "new_name" + text[key.end_mark.index :]
+    first, last = key.start_mark.index, key.end_mark.index
+    assert after in [text[:first] + written + text[last:] for written in ("new_name", '"new_name"')]
     assert list(plain_at(plain(after), path[:-1])) == [
         "new_name" if name == path[-1] else name for name in plain_at(tree, path[:-1])
     ]
 
 
 @settings(max_examples=40, deadline=None)
-@given(documents(), VALUES, st.data())
+@given(documents(), st.lists(SCALARS, max_size=3) | st.dictionaries(KEYS, VALUES, max_size=3), st.data())
 def test_what_an_anchor_shares_changes_alone_or_not_at_all(
     document: tuple[str, dict[str, Any]], shared: Any, data: st.DataObject
 ) -> None:
     text, tree = document
-    assume(isinstance(shared, dict | list) and not text.startswith(("{", "---", "#")))
+    assume(not text.startswith(("{", "---", "#")))
     newline = "\r\n" if "\r\n" in text else "\n"
     text = f"first: &x {Writer(data.draw).flow(shared)}{newline}{text.rstrip()}{newline}last: {{in: *x}}{newline}"
     tree = {"first": shared, **tree, "last": {"in": shared}}

@@ -13,6 +13,7 @@ from rendergraph.catalog import Catalog
 from rendergraph.declare import Node, declaration_mistakes
 from rendergraph.glsl import Includes
 from rendergraph.glsl.source import needs
+from rendergraph.ports import WrittenPort
 from rendergraph.resources import folder, shipped_pipelines
 
 CATALOG = Catalog.discover()
@@ -34,7 +35,8 @@ def shader_names(name: str) -> set[str]:
     text = module_text(name)
     found = set(re.findall(r'"(<?[\w./]+\.(?:vert|frag|geom|comp|glsl)>?)"', text))
     cls = CATALOG.get(name).cls
-    if CATALOG.get(name).is_shader or cls.record is Node.record:
+    writes = any(isinstance(port, WrittenPort) for port in cls.ports().values())
+    if CATALOG.get(name).is_shader or (cls.record is Node.record and writes):
         found.add(cls.shader or f"{name}.frag")
     return found
 
@@ -49,6 +51,13 @@ def test_declaration(name: str) -> None:
     node = CATALOG.get(name)
     assert declaration_mistakes(node.cls) == []
     assert node.family, "nodes lie in a family's folder"
+
+
+@pytest.mark.parametrize("name", [name for name in BUILTIN if CATALOG.get(name).cls.twin])
+def test_a_twin_exists_and_has_the_outputs_of_what_it_replaces(name: str) -> None:
+    cls = CATALOG.get(name).cls
+    twin = CATALOG.get(str(cls.twin)).cls
+    assert cls.outputs().keys() <= twin.outputs().keys()
 
 
 @pytest.mark.parametrize("name", BUILTIN)

@@ -8,9 +8,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 import pytest
-
-from rendergraph.scene import atmosphere
-from rendergraph.scene.atmosphere import GROUND, TOP, VIEWER, Atmosphere
+from rendergraph.pipelines.environments import atmosphere
+from rendergraph.pipelines.environments.atmosphere import GROUND, TOP, VIEWER, Atmosphere
 
 Floats = npt.NDArray[np.float64]
 

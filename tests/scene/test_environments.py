@@ -9,9 +9,12 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
+from rendergraph.pipelines import environments
+from rendergraph.pipelines.environments.sky import OVERCAST_LUX, SUN_LUX, sun_position
+from rendergraph.pipelines.environments.studio import studio
 
 from rendergraph.errors import InputError
-from rendergraph.scene import animate, environments
+from rendergraph.scene import animate
 from rendergraph.scene.load import load
 from rendergraph.scene.model import MadeImage, Scene
 
@@ -27,7 +30,7 @@ def direction(row: npt.ArrayLike, column: npt.ArrayLike) -> Floats:
 
 def test_the_studios_light_comes_from_above() -> None:
     """Neutral; the box overhead is the brightest, the floor the darkest."""
-    picture = environments.studio().astype(np.float64)
+    picture = studio().astype(np.float64)
     np.testing.assert_array_equal(picture[..., 0], picture[..., 2])
     assert picture[:40].max() == pytest.approx(3.6, rel=1e-3)
     assert picture[200:, :, 0].mean() < 0.2 < picture[:, :, 0].mean() < picture[:56, :, 0].mean()
@@ -88,7 +91,7 @@ def test_clouds_hide_the_sun() -> None:
     rows = np.arange(256)
     up = np.cos((rows + 0.5) / 256 * np.pi)
     weight = np.sin((rows + 0.5) / 256 * np.pi) * (np.pi / 256) * (2 * np.pi)
-    assert (light[:, 0] * weight * np.maximum(up, 0)).sum() == pytest.approx(environments.OVERCAST_LUX, rel=2e-3)
+    assert (light[:, 0] * weight * np.maximum(up, 0)).sum() == pytest.approx(OVERCAST_LUX, rel=2e-3)
     assert light[0, 0] == pytest.approx(3 * light[127, 0], rel=0.02), "three times as bright as the horizon"
 
 
@@ -102,7 +105,7 @@ def test_clouds_hide_the_sun() -> None:
     ],
 )
 def test_sun_position(time: str, place: tuple[float, float], elevation: float, azimuth: float) -> None:
-    x, y, z = environments.sun_position(datetime.fromisoformat(time), *place)
+    x, y, z = sun_position(datetime.fromisoformat(time), *place)
     assert math.degrees(math.asin(y)) == pytest.approx(elevation, abs=0.4)
     assert math.degrees(math.atan2(x, -z)) == pytest.approx(azimuth, abs=0.6)
 
@@ -140,5 +143,5 @@ def test_the_sun_of_dawn_is_redder_and_never_dimmer_than_the_key_light() -> None
     colors = np.array([np.array(sun.color) * sun.intensity for sun in suns if sun is not None])
     assert np.all(np.diff(colors[:, 0] / colors[:, 2]) > 0)
     lux = colors @ [0.2126, 0.7152, 0.0722]
-    np.testing.assert_allclose(lux[:3], environments.SUN_LUX, rtol=1e-5)
-    assert lux[3] < environments.SUN_LUX / 2, "twilight is darker"
+    np.testing.assert_allclose(lux[:3], SUN_LUX, rtol=1e-5)
+    assert lux[3] < SUN_LUX / 2, "twilight is darker"

@@ -120,3 +120,92 @@ def test_who_reads_none_pays_for_none(session: rg.Session) -> None:
     assert "gbuffer.velocity" not in plan.resources
     with session.current():
         assert not session.compile(rg.load("deferred", size=SIZE)).executable.uses_previous
+
+
+CARRIED = '''
+"""An object that a vertex shader carries along."""
+
+from __future__ import annotations
+
+from rendergraph.api import Depth, InOut, Node, Radiance, Velocity, param
+
+
+class Carried(Node):
+    """An object that moves by time."""
+
+    depth = InOut(Depth, doc="Depth.")
+    radiance = InOut(Radiance, doc="Picture.")
+    velocity = InOut(Velocity, doc="Motion.")
+    speed: tuple[float, float, float] = param(default=(0.0, 0.0, 0.0), unit="m/s", doc="Speed.")
+
+    def record(self, steps):
+        out = {"radiance": self.radiance, "velocity": self.velocity, "depth": self.depth}
+        steps.geometry("carried.frag", vertex="carried.vert", out=out, objects=["ball"], materials="none")
+'''
+CARRIED_SHADERS = {
+    "carried.vert": """
+#include <frame.glsl>
+#include <geometry_vertex.glsl>
+uniform vec3 speed;
+void main() {
+    transform_vertex();
+    v_position += time * speed;
+    write_velocity_varyings(
+        v_position, previous_object_to_world(in_position) + max(time - delta_time, 0.0) * speed);
+    gl_Position = world_to_clip(v_position);
+}
+""",
+    "carried.frag": """
+#include <fragment_velocity.glsl>
+in vec3 v_normal;
+out vec4 radiance;
+out vec2 velocity;
+void main() {
+    radiance = vec4(0.5 + 0.5 * normalize(v_normal), 1.0);
+    velocity = fragment_velocity();
+}
+""",
+}
+STANDING = """scene: 1
+objects:
+  floor: {shape: plane, size: [6, 6], at: [0, -1, 0]}
+  ball: {shape: box, at: [-1, 0, 0], hidden: true}
+cameras: {main: {eye: [0, 1, 5], target: [0, 0, 0]}}
+lights: {sun: {type: directional, direction: [-1, -2, -1]}}
+"""
+
+
+def test_what_a_plugin_moves_is_followed_as_what_the_scene_moves(session: rg.Session, tmp_path: Path) -> None:
+    """The same motion by a vertex shader, in a scene that stands still, and by keyframes."""
+    plugins = tmp_path / "plugins"
+    plugins.mkdir()
+    for name, text in {"carried.py": CARRIED, **CARRIED_SHADERS}.items():
+        (plugins / name).write_text(text)
+    text = JITTERED.replace(", params: {precision: full}", "").replace(
+        "  display:",
+        """  moved:
+    type: carried
+    inputs: {depth: gbuffer.depth, radiance: light.radiance, velocity: gbuffer.velocity}
+  display:""",
+    )
+    text = text.replace("{radiance: light.radiance}}\n  aa", "{radiance: moved.radiance}}\n  aa")
+    text = text.replace("velocity: gbuffer.velocity}}\noutputs", "velocity: moved.velocity}}\noutputs")
+    text = text.replace("depth: gbuffer.depth, velocity: moved", "depth: moved.depth, velocity: moved")
+    text = text.replace("velocity: gbuffer.velocity, before", "velocity: moved.velocity, before")
+    (tmp_path / "moved.yaml").write_text(text)
+    (tmp_path / "standing.yaml").write_text(STANDING)
+    keys = "keyframes: {objects.ball.at: {0: [-1, 0, 0], 1: [2, 0.6, 0]}}\n"
+    (tmp_path / "keyed.yaml").write_text(STANDING + keys)
+    drawn = {}
+    for scene, speed in (("standing", (3.0, 0.6, 0.0)), ("keyed", (0.0, 0.0, 0.0))):
+        pipeline = rg.load(tmp_path / "moved.yaml", scene=tmp_path / f"{scene}.yaml", plugins=[plugins])
+        pipeline = pipeline.set("moved.speed", list(speed))
+        outputs = ["image", "velocity"]
+        drawn[scene] = list(session.frames(pipeline, frames=range(1, 9), outputs=outputs))[-1]
+        lost = list(session.frames(pipeline.set("aa.velocity", None), frames=range(1, 9), outputs=["image"]))[-1]
+        off = np.abs(lost["image"].astype(int) - drawn[scene]["image"])
+        assert off.max() > 20
+    moving = np.abs(drawn["keyed"]["velocity"]).max(axis=-1) > 1e-3
+    assert 0.02 < moving.mean() < 0.5
+    np.testing.assert_allclose(drawn["standing"]["velocity"], drawn["keyed"]["velocity"], atol=2e-4)
+    np.testing.assert_allclose(drawn["standing"]["image"].astype(int), drawn["keyed"]["image"], atol=2)

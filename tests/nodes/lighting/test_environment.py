@@ -206,7 +206,7 @@ def test_the_backdrop_is_the_picture(session: rg.Session, plugins: list[Path]) -
     scene.write_text(BALL.replace("ball: {", "ball: {hidden: true, ").replace("intensity: 0", "intensity: 1"))
     patch = {"around": {"type": "environment_light"}, "light": {"inputs": {"environment": "around.light"}}}
     found = drawn(session, plugins, "forward", patch, "ball.yaml")
-    from rendergraph.scene.environments import studio
+    from rendergraph.pipelines.environments.studio import studio
 
     x, y = np.meshgrid((np.arange(48) + 0.5) / 24 - 1, 1 - (np.arange(36) + 0.5) / 18)
     half = np.tan(np.pi / 8)

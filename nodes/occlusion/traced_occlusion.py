@@ -1,0 +1,53 @@
+"""Ambient occlusion by rays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rendergraph.api import Input, Internal, Normal, Output, SceneData, Steps, define
+
+from ._screen_space import ScreenSpaceOcclusion, reduced_size
+
+
+class TracedOcclusion(ScreenSpaceOcclusion):
+    """Trace rays into the hemisphere: exact ambient occlusion.
+
+    Visibility is the part of `samples` cosine-weighted rays that reach `radius` without meeting a surface (Zhukov,
+    Iones and Kronin, "An Ambient Light Illumination Model", 1998). Unlike the techniques of screen space it knows what
+    lies outside the picture and behind other surfaces. The result is not filtered: `animated` traces other rays in each
+    frame, whose mean `accumulate` takes, and `denoise` smooths a single frame. At a reduced `scale` fewer pixels are
+    traced, and the others interpolated.
+
+    It is the twin of the occlusion techniques, and takes their place with `-s ao.type=traced_occlusion`.
+    """
+
+    scene = Input(SceneData, rays=True, doc="The scene.")
+    bent_normal = Output(
+        Normal,
+        format="rgba16_snorm",
+        size="depth",
+        doc="Unit vector, the mean unoccluded direction, world space; 0 for background.",
+    )
+    unfiltered_vector = Internal(format="rgba16f", size=reduced_size)
+
+    samples: int = define(default=16, min=1, max=1024, doc="Rays per pixel.")
+    animated: bool = define(default=True, doc="Trace other rays in each frame, for a mean over frames.")
+
+    def record(self, steps: Steps) -> None:
+        """Record the rays, and the way to full size."""
+        out: dict[str, Any] = {port.name: port for port in (self.occlusion, self.bent_normal) if steps.used(port)}
+        reduced = self.size_defines(steps)
+        macros = {**reduced, **({"HAS_VECTOR": 1} if self.bent_normal.name in out else {})}
+        traced = self.unfiltered_vector if self.bent_normal.name in out else self.unfiltered
+        steps.fullscreen(
+            "traced_occlusion.frag",
+            out={"filtered": traced} if reduced else out,
+            defines=macros if reduced else {**macros, "FINAL": 1},
+            scene=self.scene,
+            depth=self.depth,
+            normal=self.normal,
+            reduced_size=steps.desc(traced).size,
+        )
+        if reduced:
+            self.gather_surfaces(steps)
+            self.upsample(steps, traced, out, macros)

@@ -1,0 +1,98 @@
+"""Shadows by rays to the lights."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rendergraph.api import Any as AnyTexel
+from rendergraph.api import (
+    Depth,
+    Facts,
+    Function,
+    Input,
+    Internal,
+    Output,
+    SceneData,
+    ShadowLookup,
+    ShadowMap,
+    Steps,
+    Visibility,
+    define,
+    param,
+)
+
+from ._casting import Casting
+
+
+def _light_texels(node: Any, facts: Facts) -> tuple[int, int]:
+    return max(1, len(facts.lights)), 1
+
+
+class TracedShadows(Casting):
+    """Trace rays to the lights: exact shadows of everything that casts some.
+
+    A light without a size has one ray for each pixel, and hard shadows. A light with a size is a disc that faces the
+    point, of the diameter `size` for point and spot lights and of the angular diameter `angle` for directional ones;
+    visibility is the mean over `samples` rays to points of it. What shadow maps miss is in it: thin gaps, contact, any
+    number of lights, casters outside the picture, alpha masks. Rays see the scene as it is uploaded, so vertices that a
+    shader of a plugin moves cast the shadow of where they were.
+
+    It is the twin of all shadow-map techniques, and takes their place with `-s shadows.type=traced_shadows`. The lights
+    of a connected shadow map are the ones that it traces; the map itself is not drawn.
+    """
+
+    scene = Input(SceneData, rays=True, doc="The scene.")
+    shadow_map = Input(
+        ShadowMap, kind="texture2d_array", size="any", optional=True, doc="Tells the lights, and is not drawn."
+    )
+    depth = Input(Depth, optional=True, doc="Depth of the picture, for `visibility`.")
+    casters = Internal(AnyTexel, format="r8", size=_light_texels, kept=True)
+    lookup = Function(
+        ShadowLookup, "traced_shadows.glsl", reads=("scene", "casters"), doc="Visibility, for shaders to call."
+    )
+    visibility = Output(
+        Visibility,
+        kind="texture2d_array",
+        format="r16",
+        layers=lambda node, facts: len(node.lights(facts)),
+        lights=lambda node, facts: node.lights(facts),
+        needs=("depth",),
+        doc="1 is lit, 0 in shadow; one layer per light.",
+    )
+
+    size: float = param(
+        default=0.0, unit="m", min=0, max=100, doc="Diameter of point and spot lights; 0: hard shadows."
+    )
+    angle: float = param(
+        default=0.0,
+        unit="rad",
+        min=0,
+        max=1.5,
+        doc="Angular diameter of directional lights; 0: hard shadows. The sun's is 0.0093.",
+    )
+    samples: int = define(default=16, min=1, max=1024, doc="Rays to a light that has a size.")
+    animated: bool = define(default=True, doc="Trace other rays in each frame, for a mean over frames.")
+
+    def lights(self, facts: Facts) -> tuple[int, ...]:
+        """Return the lights whose shadows are traced, as the scene's indices."""
+        shadow_map = self.shadow_map.name
+        if facts.connected(shadow_map):
+            return tuple(dict.fromkeys(facts.input(shadow_map).lights))
+        return super().lights(facts)
+
+    def record(self, steps: Steps) -> None:
+        """Record which lights cast, and the rays of every pixel if `visibility` is used."""
+        lights = self.lights(steps.facts)
+        casters = np.zeros((1, max(1, len(steps.facts.lights)), 1), np.uint8)
+        casters[0, list(lights), 0] = 255
+        steps.upload(self.casters, casters)
+        for layer, light in enumerate(lights) if steps.used(self.visibility) else ():
+            steps.fullscreen(
+                "map_visibility.frag",
+                out={"visibility": self.visibility.layer(layer)},
+                depth=self.depth,
+                shadow=self.lookup,
+                defines={"LIGHT": light},
+            )

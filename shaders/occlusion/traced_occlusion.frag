@@ -1,0 +1,40 @@
+// Ambient visibility by cosine-weighted rays: the part of them that meets nothing within the radius.
+#include <depth_surface.glsl>
+#include <frame.glsl>
+#include <ray_directions.glsl>
+#include <trace.glsl>
+#include "surfaces.glsl"
+#include "outputs.glsl"
+
+uniform sampler2D normal;    // world space
+uniform ivec2 reduced_size;  // of the target
+uniform float radius;        // metres
+
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    ivec2 texel = screen_texel(pixel, reduced_size, textureSize(depth, 0));
+    float window_depth;
+    vec3 position = position_at(texel, TEXEL_CENTER, window_depth);
+    if (is_nothing(window_depth)) {
+        write_outputs(OPEN_VALUE);
+        return;
+    }
+    vec3 axis = normalize(texelFetch(normal, texel, 0).xyz);
+    vec3 geometric_normal = geometric_normal_at(texel, TEXEL_CENTER, position, window_depth);
+    // At outlines the differences of depth are those of two surfaces.
+    if (dot(geometric_normal, axis) < 0.25) geometric_normal = axis;
+    vec3 origin = position + geometric_normal * ray_offset(position, linear_depth(depth_views[0], window_depth));
+    vec2 shift = random_shift(pixel, ANIMATED * frame_index);
+    vec4 open = vec4(0.0);  // xyz: sum of the unoccluded directions, w: their number
+    for (int i = 0; i < SAMPLES; ++i) {
+        vec3 ray = cosine_direction(axis, shifted_point(i, shift));
+        Hit hit;
+        if (!nearest_hit(origin, ray, 0.0, radius, hit)) open += vec4(ray, 1.0);
+    }
+    open.w /= float(SAMPLES);
+#ifdef HAS_VECTOR
+    write_outputs(open);
+#else
+    write_outputs(open.w);
+#endif
+}
