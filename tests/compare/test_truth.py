@@ -153,10 +153,10 @@ SHADERS = {
     "show.frag": "uniform sampler2D radiance;\n#ifdef HAS_GAIN\nuniform sampler2D gain;\n#endif\nout vec4 color;\n"
     "void main() { float factor = 0.25;\n#ifdef HAS_GAIN\nfactor = texelFetch(gain, ivec2(0), 0).x;\n#endif\n"
     "color = clamp(factor * texelFetch(radiance, ivec2(gl_FragCoord.xy), 0), 0.0, 1.0); }",
-    "sampled.frag": _HEAD + _NOISE + _EXACT + "uniform sampler2D previous;\n"
+    "sampled.frag": "#include <frame.glsl>\n" + _HEAD + _NOISE + _EXACT + "uniform sampler2D previous;\n"
     "out vec4 radiance; out vec4 variance; out float samples_taken; out vec4 mean;\n"
     f"void main() {{ vec4 old = texelFetch(previous, ivec2(gl_FragCoord.xy), 0); float n = old.w + 1.0;\n"
-    f"vec3 drawn = exact(v_uv) + {SPREAD} * sign_of(gl_FragCoord.xy, n);\n"
+    f"vec3 drawn = exact(v_uv) + time + {SPREAD} * sign_of(gl_FragCoord.xy, n);\n"
     "mean = vec4(mix(old.rgb, drawn, 1.0 / n), n); radiance = vec4(mean.rgb, 1.0);\n"
     f"variance = vec4(vec3({SPREAD * SPREAD} / n), 1.0); samples_taken = 16.0 * n; }}",
 }
@@ -366,6 +366,15 @@ def test_scenes_that_move_stand_still_while_the_truth_is_drawn(gl: rg.Session, t
     assert all(np.array_equal(frame["radiance"], fixed["radiance"]) for frame in held)
     assert not np.array_equal(pipeline.render(session=gl, frames=range(7, 8))["radiance"], fixed["radiance"])
     assert held[-1].number == 7
+
+
+def test_the_truth_is_that_of_the_compared_frame(make: Maker, gl: rg.Session) -> None:
+    """All of its frames have the time of that one, and none before it counts."""
+    limits: Any = {"reference_noise": 1e-9, "reference_samples": 64}
+    found = compare(make.approximate(), make.truth(), frames=1, session=gl, frame=31, **limits)
+    assert found.reference.samples == 64
+    assert found.reference.light is not None
+    assert np.abs(found.reference.light - (_exact_light() + 1.0)).max() <= SPREAD + 1e-5
 
 
 def test_limits_without_a_truth_and_pictures_without_one_light_are_refused(make: Maker, gl: rg.Session) -> None:

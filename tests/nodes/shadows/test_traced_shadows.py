@@ -85,6 +85,13 @@ def test_hard_shadows_are_those_of_rays(session: rg.Session, tmp_path: Path, kin
     assert (visibility[0][points[..., 1] > 0.899] == 1).mean() > 0.99  # the top of the box sees the light
 
 
+def test_what_lies_behind_a_lamp_casts_no_shadow(session: rg.Session, tmp_path: Path) -> None:
+    below = "lamp: {type: point, at: [-0.1, 0.3, 0.1], intensity: 4}"  # between the floor and the box
+    visibility, points = draw(session, tmp_path, below)
+    on_floor = np.abs(points[..., 1]) < 1e-3
+    assert visibility[0][on_floor].min() == 1.0
+
+
 @pytest.mark.parametrize(("kind", "width"), [("point", 0.8), ("directional", 0.3)])
 def test_soft_shadows_are_the_mean_over_a_disc(session: rg.Session, tmp_path: Path, kind: str, width: float) -> None:
     setting = f"shadows.{'angle' if kind == 'directional' else 'size'}={width}"
