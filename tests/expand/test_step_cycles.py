@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from itertools import groupby
+from itertools import groupby, permutations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from rendergraph.api import (
+    ADD,
     Function,
     History,
     InOut,
@@ -18,8 +22,10 @@ from rendergraph.api import (
     Output,
     Radiance,
     ShadowLookup,
+    State,
     Steps,
     param,
+    structural,
 )
 from rendergraph.diagrams import markup, picture
 from rendergraph.errors import InputError
@@ -275,3 +281,91 @@ outputs: {image: twisted.last, third: third.composed}
     np.testing.assert_array_equal(frame["image"][0, :, 0], 5 * X[0])
     np.testing.assert_array_equal(frame["third"][0, :, 0], 5 * X[0] + 0.5 * X[0] + 2)
     assert (frame["twisted.radiance"] == 0.25).all()
+
+
+# --- any graph of steps, in any bundles ------------------------------------------------------------------------------
+
+
+class Bundle(Node):
+    """Up to three steps: each adds two values and a number of its own, in place or not."""
+
+    a0, a1, a2 = (Input(Radiance, optional=True, doc="A value.") for _ in range(3))
+    b0, b1, b2 = (Input(Radiance, optional=True, doc="Another.") for _ in range(3))
+    c0, c1, c2 = (InOut(Radiance, optional=True, format="r32f", doc="What is added to.") for _ in range(3))
+    v0, v1, v2 = (Output(Radiance, format="r32f", doc="The sum.") for _ in range(3))
+
+    order: int = structural(default=0, min=0, max=5, doc="In which order they are recorded.")
+    k0: float = param(default=0.0, doc="A number.")
+    k1: float = param(default=0.0, doc="A number.")
+    k2: float = param(default=0.0, doc="A number.")
+
+    def record(self, steps: Steps) -> None:
+        ports = self.ports()
+        for i in list(permutations(range(3)))[self.order]:
+            a, b, c, v = (ports[f"{letter}{i}"] for letter in "abcv")
+            reads: dict[str, Any] = {name: port for name, port in (("a", a), ("b", b)) if steps.connected(port)}
+            options: dict[str, Any] = {"defines": {f"HAS_{name.upper()}": 1 for name in reads}}
+            if steps.connected(c):
+                options |= {"out": {"value": c}, "state": State(blend=ADD)}
+            elif steps.used(v):
+                options |= {"out": {"value": v}}
+            else:
+                continue
+            unread = {} if reads else dict.fromkeys(self.inputs())
+            steps.fullscreen("add.frag", **{**unread, **reads}, number=getattr(self, f"k{i}"), **options)
+
+
+SHARES = {"a": 0.5, "b": 0.25}
+ADD_FRAG = """uniform sampler2D a, b;
+uniform float number;
+out float value;
+void main() {
+    value = number;
+#ifdef HAS_A
+    value += 0.5 * texelFetch(a, ivec2(0), 0).r;
+#endif
+#ifdef HAS_B
+    value += 0.25 * texelFetch(b, ivec2(0), 0).r;
+#endif
+}
+"""
+
+
+@given(st.data())
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_bundles_of_steps_compute_what_the_steps_do(bench: Any, gl: rg.Session, data: st.DataObject) -> None:
+    coin = st.booleans()
+    count: int = data.draw(st.integers(2, 9))
+    values: list[float] = []
+    links: list[dict[str, str]] = []
+    free: set[int] = set()  # read by nobody yet
+    place: list[int] = data.draw(st.permutations(range(count)))  # which step of which node each is
+    name = [f"n{at // 3}.{{}}{at % 3}" for at in place]
+    ends: list[str] = []
+    for step in range(count):
+        readable = [earlier for earlier in range(step) if ends[earlier]]
+        chosen = {port: data.draw(st.sampled_from(readable)) for port in "ab" if data.draw(coin) and readable}
+        value = step + 1.0 + sum(SHARES[port] * values[earlier] for port, earlier in chosen.items())
+        links.append({port: ends[earlier] for port, earlier in chosen.items()})
+        free -= set(chosen.values())
+        ends.append(name[step].format("v"))
+        if data.draw(coin) and free:  # adds to what nobody reads, and nobody can from now on
+            before = data.draw(st.sampled_from(sorted(free)))
+            links[-1]["c"], value = ends[before], value + values[before]
+            ends[step], ends[before] = name[step].format("c"), ""
+            free.discard(before)
+        values.append(value)
+        free.add(step)
+    nodes: dict[str, Any] = {}
+    for step, at in enumerate(place):
+        node = nodes.setdefault(f"n{at // 3}", {"type": "bundle", "inputs": {}, "params": {}})
+        node["inputs"] |= {f"{port}{at % 3}": end for port, end in links[step].items()}
+        node["params"][f"k{at % 3}"] = step + 1.0
+    for node in nodes.values():
+        node["params"]["order"] = data.draw(st.integers(0, 5))
+    outputs = {f"o{step}": end for step, end in enumerate(ends) if end}
+    text = yaml.safe_dump({"nodes": nodes, "outputs": outputs})
+    frame = gl.render(bench.pipeline(text, Bundle, shaders={"add.frag": ADD_FRAG}, size=(1, 1)))
+    for step, value in enumerate(values):
+        if ends[step]:
+            assert frame[f"o{step}"].item() == pytest.approx(value, rel=1e-6)
