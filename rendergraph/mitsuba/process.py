@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import weakref
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,7 @@ class Tracer:
     Args:
         bounces: 0 for light that reaches what the camera sees directly.
         shared: diffuse reflection is what the specular one leaves (`diffuse: shared` of lighting nodes).
+        ambient: constant radiance from all sides that the camera does not see, for scenes without an environment.
         shadows: False lets punctual lights through everything.
         jitter: samples fill the pixel; False takes all in its middle.
 
@@ -56,9 +58,10 @@ class Tracer:
         scene: Scene,
         view: ViewMatrices,
         *,
-        bounces: int = 8,
+        bounces: int = 4,
         seed: int = 0,
         shared: bool = False,
+        ambient: Sequence[float] = (0.0, 0.0, 0.0),
         shadows: bool = True,
         jitter: bool = True,
         limits: SceneLimits = SceneLimits(),
@@ -74,6 +77,7 @@ class Tracer:
         request, arrays = scene_values(scene, texels)
         request |= {"camera": camera_values(view), "bounces": bounces, "seed": seed}
         request |= {"shared": shared, "shadows": shadows, "jitter": jitter}
+        request["ambient"] = list(ambient) if any(ambient) else None
         folder = tempfile.TemporaryDirectory(prefix="rendergraph-")
         self._folder = Path(folder.name)
         (self._folder / "request.json").write_text(json.dumps(request))

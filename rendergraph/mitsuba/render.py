@@ -34,13 +34,15 @@ def build(request: Mapping[str, Any], arrays: Mapping[str, Any], tables: Tables)
         parts[f"light{number}"] = Punctual(light, request["shadows"])
     if request["environment"] is not None:
         parts["environment"] = environment(arrays["environment"], **request["environment"])
+    elif request["ambient"]:
+        parts["ambient"] = {"type": "constant", "radiance": {"type": "rgb", "value": request["ambient"]}}
     return mi.load_dict(parts)
 
 
 def _mesh(values: Mapping[str, Any], tables: Tables, arrays: Mapping[str, Any], request: Mapping[str, Any]) -> Any:
     (vertex, face), (vertices, faces), material = values["first"], values["size"], values["material"]
     props, uv = mi.Properties(), 0
-    props["bsdf"] = Surface(tables, face, request["shared"], request["shadows"])
+    props["bsdf"] = Surface(tables, face, request)
     if material >= 0:
         props["emission"] = Emission(tables, material, bool(arrays["flags"][face, 2]))
         uv = 2 * int(arrays["slot.emissive"][material, 5]) if "slot.emissive" in arrays else 0
@@ -106,6 +108,8 @@ class Picture:
             x, y = (pixel % width + within.x) / width, (pixel // width + within.y) / height
             ray = cull_back_faces(self.scene, camera_rays(camera, x, y))
             light, _, _ = self.integrator.sample(self.scene, self.sampler, ray)
+            if self.request["environment"] is None and self.request["ambient"]:  # the camera does not see it
+                light &= self.scene.ray_test(mi.Ray3f(ray))
             sums = [dr.block_sum(value, count) for value in (*light, *(light * light))]
             dr.eval(*sums)
             self.sums += np.stack([np.array(value, np.float64).reshape(height, width) for value in sums])

@@ -15,6 +15,8 @@ import mitsuba as mi
 import numpy as np
 
 _LEAST_ALPHA = 1e-3
+_SAME_DIRECTION = 1e-6
+"""Squared difference of unit vectors, above rounding; a thousandth of a radian of light from all sides is nothing."""
 _MIRROR, _CLAMP, _OPAQUE, _MASK = 1, 2, 0, 1
 
 
@@ -61,7 +63,8 @@ class Tables:
         names = [name for name in arrays if name.startswith(("vertex.", "material.", "slot."))]
         self.rows = {name: mi.Float(np.asarray(arrays[name], np.float32).ravel()) for name in names}
         self.corners, self.flags = mi.UInt32(arrays["corners"].ravel()), mi.UInt32(arrays["flags"].ravel())
-        self.passes_light = bool((arrays["flags"][:, 1] > 0).any() or (arrays["flags"][:, 3] == 0).any())
+        self.lets_light_through = not arrays["flags"][:, 3].all()
+        self.passes_light = self.lets_light_through or bool(arrays["flags"][:, 1].any())
         grain = bool((arrays["material.extra"][:, 1] > 0).any())
         self.has_tangents = grain or not {"slot.normal", "slot.anisotropy"}.isdisjoint(names)
         count = sum(name.startswith("image.") for name in arrays)
@@ -141,14 +144,15 @@ class Surface(mi.BSDF):
 
     Args:
         first_face: the number of the mesh's first triangle in the tables.
-        shared: whether the diffuse part is what the dielectric does not reflect (glTF 2.0, appendix B).
-        shadows: whether a triangle hides from a point on it what is behind it; its normals may lean there.
+        request: `shared`, whether the diffuse part is what the dielectric does not reflect (glTF 2.0, appendix B);
+            `shadows`, whether a triangle hides from a point on it what is behind it, where normals may lean; `lights`.
     """
 
-    def __init__(self, tables: Tables, first_face: int, shared: bool, shadows: bool) -> None:
+    def __init__(self, tables: Tables, first_face: int, request: Mapping[str, Any]) -> None:
         super().__init__(mi.Properties())
         self.tables, self.first_face = tables, dr.opaque(mi.UInt32, first_face)
-        self.shared, self.shadows = shared, shadows
+        self.shared, self.shadows = request["shared"], request["shadows"]
+        self.lights = request["lights"] if tables.lets_light_through else []
         flags = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.GlossyReflection
         flags |= mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
         flags |= mi.BSDFFlags.Null if tables.passes_light else flags
@@ -247,6 +251,16 @@ class Surface(mi.BSDF):
         return dr.select(self.tables.face(si, self.first_face, active).z > 0, 0.0, 1.0)
 
     def eval_null_transmission(self, si: Any, active: Any = True) -> Any:
-        """What a shadow ray keeps."""
+        """Return what a shadow ray keeps: all of it where it goes to a punctual light and no shadow is cast.
+
+        Mitsuba does not say which light a ray goes to, but no other light lies in exactly its direction.
+        """
         p = self.tables.point(si, self.first_face, active)
-        return mi.Color3f(dr.select(p.casts_shadow > 0, 1 - p.alpha, 1)) & active
+        onwards, lets_through = -si.to_world(si.wi), mi.Bool(False)
+        for light in self.lights:
+            if light["type"] == "directional":
+                to_light = mi.Vector3f(*(-value for value in light["direction"]))
+            else:
+                to_light = dr.normalize(mi.Point3f(*light["position"]) - si.p)
+            lets_through |= dr.squared_norm(to_light - onwards) < _SAME_DIRECTION
+        return mi.Color3f(dr.select((p.casts_shadow == 0) & lets_through, 1, 1 - p.alpha)) & active

@@ -352,17 +352,36 @@ def test_direct_light_without_shadows_is_the_rasterisers(
     assert light[seen].mean() == pytest.approx(drawn[seen].mean(), rel=0.01)
 
 
-def test_what_casts_no_shadow_lets_light_through(tmp_path: Path) -> None:
+def test_what_casts_no_shadow_lets_only_punctual_lights_through(tmp_path: Path) -> None:
+    """The environment stays behind it, as do emissive surfaces, whatever the way in which their light is found."""
+    write(tmp_path / "white.exr", np.ones((8, 16, 3), np.float32))
     text = (
-        "objects:\n  floor: {{shape: plane, size: [9, 9], material: m}}\n"
-        "  sheet: {{shape: plane, size: [9, 9], at: [0, 1, 0], casts_shadow: {}, material: m}}\n"
-        "materials: {{m: {{base_color: 0.5, double_sided: true}}}}\n"
-        "lights: {{sun: {{type: directional, direction: [0, -1, 0], intensity: 3}}}}\n"
+        "objects:\n  floor: {{shape: plane, size: [90, 90], material: m}}\n"
+        "  sheet: {{shape: plane, size: [900, 900], at: [0, 1, 0], casts_shadow: {}, material: m}}\n"
+        "materials: {{m: {{base_color: 0.5, double_sided: true, specular: 0}}}}\n{}\n"
         "cameras: {{main: {{eye: [0, 0.5, 0], target: [0, 0, 0], up: [0, 0, -1]}}}}\n"
     )
-    lit, dark = (trace(scene_of(tmp_path, text.format(casts)), (8, 8), 4, bounces=0)[0] for casts in ("false", "true"))
-    assert lit.min() > 0.4
-    assert dark.max() == 0
+    sun = "lights: {sun: {type: directional, direction: [0.2, -1, 0.1], intensity: 3}}"
+    lamp = "lights: {lamp: {type: point, at: [1, 5, 0], intensity: 30}}"
+    for light in (sun, lamp):
+        scenes = (scene_of(tmp_path, text.format(casts, light)) for casts in ("false", "true"))
+        lit, dark = (trace(scene, (8, 8), 4, bounces=0)[0] for scene in scenes)
+        assert lit.min() > 0.1
+        assert dark.max() == 0
+    sky = "environment: {file: white.exr}"
+    assert trace(scene_of(tmp_path, text.format("false", sky)), (8, 8), 16, bounces=0)[0].mean() < 0.02
+
+
+def test_ambient_light_comes_from_all_sides_and_is_not_seen(tmp_path: Path) -> None:
+    scene = scene_of(
+        tmp_path,
+        "objects: {b: {shape: sphere, material: m}}\nmaterials: {m: {base_color: 0.5, specular: 0}}\n"
+        "cameras: {main: {eye: [0, 1, 6], target: [0, 0, 0]}}\n",
+    )
+    scene = replace(scene, lights=())
+    light, _ = trace(scene, (33, 33), 64, bounces=0, ambient=(0.2, 0.4, 0.6), jitter=False)
+    np.testing.assert_allclose(light[16, 16], [0.1, 0.2, 0.3], rtol=0.1)
+    assert not light[0, 0].any()
 
 
 def test_masks_let_light_through_where_they_are_transparent(tmp_path: Path) -> None:

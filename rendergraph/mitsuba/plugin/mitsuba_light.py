@@ -27,7 +27,8 @@ class MitsubaLight(Node):
     traced = Internal(kind="buffer", bytes=_bytes)
 
     samples: int = param(default=16, min=1, max=4096, doc="Samples of each pixel in a frame.")
-    max_bounces: int = param(default=8, min=0, max=64, doc="Reflections between surfaces; 0 is direct light only.")
+    max_bounces: int = param(default=4, min=0, max=64, doc="Reflections between surfaces; 0 is direct light only.")
+    ambient: float = param(default=0.03, min=0, doc="Radiance from all sides, for scenes without an environment.")
     diffuse: Literal["lambert", "shared"] = structural(default="lambert", doc="As of lighting nodes.")
 
     def record(self, steps: Steps) -> None:
@@ -45,8 +46,8 @@ class MitsubaLight(Node):
         """Take the samples of a frame, and upload the mean of all so far."""
         if frame.changed() or self not in _TRACERS:
             scene: Any = frame.scene
-            shared = self.diffuse == "shared"
-            _TRACERS[self] = Tracer(scene.scene, frame.camera, bounces=self.max_bounces, shared=shared), 0
+            options: Any = {"bounces": self.max_bounces, "shared": self.diffuse == "shared"}
+            _TRACERS[self] = Tracer(scene.scene, frame.camera, ambient=(self.ambient,) * 3, **options), 0
         tracer, taken = _TRACERS[self]
         taken += self.samples
         traced = tracer.trace(taken)
