@@ -34,7 +34,7 @@ _OPERATIONS: Mapping[str, tuple[int, int, str]] = {
 _dry_run = click.option("--dry-run", is_flag=True, help="Show the difference, and write nothing.")
 
 
-@click.command("edit", no_args_is_help=True)
+@click.command("edit", no_args_is_help=True, context_settings={"ignore_unknown_options": True})  # -1 is a value
 @click.argument("file", type=options.NamedPath(dir_okay=False))
 @click.argument("operation", type=click.Choice([*_OPERATIONS]))
 @click.argument("words", nargs=-1)
@@ -59,9 +59,11 @@ def command(
     Examples:
       rendergraph edit my.yaml add ao ssao_hemisphere depth=gbuffer.depth normal=gbuffer.normal
       rendergraph edit my.yaml connect light.occlusion ao.occlusion
-      rendergraph edit my.yaml set ao.radius 0.5 --dry-run
+      rendergraph edit my.yaml set display.exposure -0.5 --dry-run
       rendergraph edit my.yaml insert glow bloom display.radiance
     """
+    if unknown := next((word for word in words if word.startswith("--")), None):
+        raise click.NoSuchOption(unknown, ctx=click.get_current_context())
     least, most, shown = _OPERATIONS[operation]
     if not least <= len(words) <= most or (operation == "insert" and len(words) == 4):
         raise UsageError(Problem("RG500", f"expected `rendergraph edit FILE {operation} {shown}`"))

@@ -242,6 +242,10 @@ def test_the_command_writes_shows_and_checks(
     assert main(["edit", "mine.yaml", "connect", "display.radiance", "light.radiance", "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert (report["written"], report["errors"]) == (True, [])
+    assert main(["edit", "mine.yaml", "set", "display.exposure", "-0.5", "-q"]) == 0
+    assert b"params: {exposure: -0.5}" in file.read_bytes()
+    assert main(["edit", "mine.yaml", "set", "display.exposure", "1", "--dry-rum"]) == 2
+    assert "did you mean '--dry-run'" in capsys.readouterr().err
     assert main(["edit", "mine.yaml", "add", "glow"]) == 2
     assert "expected `rendergraph edit FILE add ID TYPE [NAME=VALUE]...`" in capsys.readouterr().err
     assert main(["edit", "forward", "disable", "sun"]) == 3
