@@ -209,6 +209,7 @@ class SceneDataFacts(Struct, frozen=True):
         emitters: triangles that emit light in some frame, of objects that are not hidden.
         textures: the arrays that hold the materials' textures.
         smaller: images that are smaller than the layers of their array, of which they fill a corner.
+        trees: a limit of the bytes of the trees for rays, among `bytes`; 0 where no input asks for them.
     """
 
     bytes: int = 0
@@ -216,12 +217,15 @@ class SceneDataFacts(Struct, frozen=True):
     emitters: int = 0
     textures: tuple[TextureDesc, ...] = ()
     smaller: int = 0
+    trees: int = 0
 
     @property
     def note(self) -> str:
         """What takes the bytes, in one line."""
         in_arrays = sum(desc.bytes for desc in self.textures)
-        text = f"{format_bytes(self.bytes - in_arrays)} of buffers"
+        text = f"{format_bytes(self.bytes - self.trees - in_arrays)} of buffers"
+        if self.trees:
+            text += f", at most {format_bytes(self.trees)} of trees for rays"
         if self.textures:
             listed = [f"{desc.layers} of {desc.width}×{desc.height} {desc.format}" for desc in self.textures]
             text += f", {format_bytes(in_arrays)} of texture arrays ({'; '.join(listed)})"

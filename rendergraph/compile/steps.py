@@ -368,6 +368,7 @@ class _Compiler(Struct, eq=False, dict=True):
             used = {name for text in texts().values() for _, name, _ in declared_blocks(text.text)}
             held = dict(self.scene.data.buffers)
             if "scene_tree_block" in used:
+                check_scene_includes(step, texts(), self.types)
                 held["scene_tree_block"] = self.scene.tree()
             if "scene_previous_block" in used:
                 held["scene_previous_block"] = self.scene.previous()

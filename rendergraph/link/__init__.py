@@ -38,7 +38,7 @@ def link(
     lights: Sequence[LightFacts] = (),
     objects: Sequence[ObjectFacts] | None = None,
     environment: TextureDesc | None = None,
-    scene_data: Callable[[], SceneDataFacts] = SceneDataFacts,
+    scene_data: Callable[[bool], SceneDataFacts] = lambda rays: SceneDataFacts(),
     materials: Sequence[MaterialFacts] = (),
     camera: CameraFacts = CameraFacts(),
 ) -> Graph:
@@ -47,7 +47,7 @@ def link(
     Args:
         lights: the scene's lights in its order; sizes and layers may depend on them.
         objects: the scene's objects; None without a scene, where any may exist.
-        scene_data: called if some node reads the scene's data.
+        scene_data: called if some node reads the scene's data, with whether rays are traced in it.
     """
     given = None if objects is None else tuple(objects)
     scene = environment, scene_data, tuple(materials), camera
@@ -134,7 +134,7 @@ class _Linker(Struct, eq=False):
     lights: tuple[LightFacts, ...]
     objects: tuple[ObjectFacts, ...] | None
     environment: TextureDesc | None
-    scene_data: Callable[[], SceneDataFacts] = SceneDataFacts
+    scene_data: Callable[[bool], SceneDataFacts] = lambda rays: SceneDataFacts()
     materials: tuple[MaterialFacts, ...] = ()
     camera: CameraFacts = CameraFacts()
     sketching: bool = False
@@ -165,13 +165,13 @@ class _Linker(Struct, eq=False):
         cyclic = cycles(nodes) if len(order) < len(nodes) else []
         used = {end.source for draft in nodes.values() for links in draft.links.values() for end in links}
         used |= {found.source for found in outputs.values()}
-        reads_scene = any(port.kind == "scene" for draft in nodes.values() for port in draft.inputs.values())
+        scenes = [port for draft in nodes.values() for port in draft.inputs.values() if port.kind == "scene"]
         facts = Facts(
             self.spec.size,
             self.lights,
             objects=self.objects or (),
             environment=self.environment,
-            scene_data=self.scene_data() if reads_scene else None,
+            scene_data=self.scene_data(any(getattr(port, "rays", False) for port in scenes)) if scenes else None,
             materials=self.materials,
             camera=self.camera,
         )

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from rendergraph.facts import SceneDataFacts
 from rendergraph.scene.model import ImageSource, Scene, Texture
 from rendergraph.scene.pack import SLOTS, PackedScene, Records
-from rendergraph.scene.tree_data import stack_size
+from rendergraph.scene.tree_data import most_bytes, stack_size
 from rendergraph.textures import FORMATS, TextureDesc
 
 _FLAGS = (
@@ -129,18 +129,21 @@ def texture_data(scene: Scene, sizes: Mapping[Stored, tuple[int, int]], arrays: 
     return table
 
 
-def scene_data_facts(scene: Scene) -> SceneDataFacts:
-    """Return what inputs of `SceneData` bring along in this scene."""
+def scene_data_facts(scene: Scene, rays: bool = False) -> SceneDataFacts:
+    """Return what inputs of `SceneData` bring along in this scene, some of them with `rays`."""
     vertices = sum(len(mesh.positions) for mesh in scene.meshes)
     width = 6 + sum(size for name, size in _OPTIONAL.items() if any(getattr(m, name) is not None for m in scene.meshes))
     emitters = sum(len(scene.meshes[scene.objects[number].mesh].indices) for number in emitting_objects(scene))
     textures = expected_arrays(scene)
+    trees = most_bytes(len(scene.objects), sum(len(mesh.indices) for mesh in scene.meshes)) if rays else 0
     return SceneDataFacts(
         bytes=4 * width * vertices
         + INSTANCE_DATA.itemsize * len(scene.objects)
         + EMITTER.itemsize * emitters
         + 16 * len(SLOTS) * len(scene.materials) * bool(textures.arrays)
-        + sum(desc.bytes for desc in textures.arrays),
+        + sum(desc.bytes for desc in textures.arrays)
+        + trees,
+        trees=trees,
         textures=textures.arrays,
         smaller=textures.smaller,
         triangles=sum(len(scene.meshes[placed.mesh].indices) for placed in scene.objects),

@@ -16,6 +16,7 @@ import rendergraph as rg
 from rendergraph.api import Any as Anything
 from rendergraph.api import DisplayColor, Function, Input, Node, Output, SceneData, ShadowLookup, Steps
 from rendergraph.compile import GpuScene
+from rendergraph.declare import declaration_mistakes
 from rendergraph.errors import InputError, RenderError
 from rendergraph.images import write
 from rendergraph.scene import scene_data
@@ -560,3 +561,30 @@ def test_a_shader_file_takes_the_scene_by_its_header(gl: rg.Session, tmp_path: P
     (tmp_path / "test.yaml").write_text(text)
     texel = gl.render(rg.load(tmp_path / "test.yaml"))["image"][0, 0]
     np.testing.assert_array_equal(np.abs(texel), [0.5, 0.5, 0.5, 2.0])  # a corner of the box, and where the other is
+
+
+def test_tracing_needs_rays_and_only_the_scene_has_them(bench: Any) -> None:
+    traced = "#include <trace.glsl>\nout vec4 color;\nvoid main() { color = vec4(any_hit(vec3(0.0), vec3(1.0), 0.0, 1.0)); }\n"
+    pipeline = bench.pipeline(ONE, Of, shaders={"of.frag": traced}, scene=BOXES)
+    with pytest.raises(InputError, match=r"of.frag:1:1: RG430 .* does not read rays; declare .*rays=True\)"):
+        pipeline.check()
+    with pytest.raises(InputError, match=r"of.frag:1:1: RG430 .* does not read rays"):
+        bench.session.render(pipeline)
+
+    class Wrong(Node):
+        """Rays of a picture."""
+
+        picture = Input(Anything, rays=True, doc="Picture.")
+
+    assert "port 'picture' has rays, but is not the scene's data" in str(declaration_mistakes(Wrong)[0])
+
+    class Traced(Of):
+        """The same with rays."""
+
+        scene = Input(SceneData, rays=True, doc="Scene.")
+
+    traced_too = bench.pipeline(ONE.replace("of}", "traced}"), Traced, shaders={"of.frag": traced}, scene=BOXES)
+    facts = traced_too.link().graph.scene_data
+    assert "of trees for rays; it is" in traced_too.plan().reasons["the scene's data"]
+    with bench.session.current():
+        assert bench.session.compile(traced_too).scene.tree().size <= facts.trees < facts.bytes
