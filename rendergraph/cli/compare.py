@@ -349,14 +349,7 @@ def truth_lines(comparison: Comparison) -> list[str]:
         return []
     part = f", {100 * share:.2g} % of the smallest error" if share is not None else ""
     lines = [f"noise of {reference.name} after {reference.samples} samples: relative MSE {reference.noise:.3g}{part}"]
-    for result in comparison.results:
-        for one in result.error_by[:1]:
-            if one.relative_mse is None or one.reduction is None or one.reduction <= 0:
-                continue
-            lines.append(
-                f"{result.name}: most of its error comes from '{one.node}' ({one.type}): with {one.twin} the relative "
-                f"MSE is {one.relative_mse:.4g}, {100 * one.reduction:.3g} % smaller"
-            )
+    lines += [f"{result.name}: {result.cause}" for result in comparison.results if result.cause]
     return lines
 
 

@@ -201,6 +201,20 @@ class Result:
         return columns
 
     @property
+    def cause(self) -> str:
+        """The technique whose twin reduces the error most, as a sentence; empty without twins."""
+        known = [one for one in self.error_by if one.relative_mse is not None and one.reduction is not None]
+        if not known:
+            return ""
+        one = known[0]
+        if one.reduction is None or one.reduction <= 0:
+            return f"no twin reduces its error, which has other causes than {', '.join(e.node for e in known)}"
+        return (
+            f"most of its error comes from {one.node} ({one.type}): with {one.twin} the relative MSE is "
+            f"{one.relative_mse:.4g}, {100 * one.reduction:.3g} % smaller"
+        )
+
+    @property
     def warnings(self) -> tuple[Problem, ...]:
         if not self.not_finite:
             return ()

@@ -70,11 +70,8 @@ def heat_map(values: Pixels) -> Bytes:
 
 
 def signed_map(values: Pixels) -> Bytes:
-    """Values -1…1 as colours: blue below 0, black at 0, orange above; NaN is magenta.
-
-    Colours grow with the square root of a value, so that small differences can be seen.
-    """
-    amount = np.sqrt(np.clip(np.abs(np.nan_to_num(values, nan=0.0)), 0, 1))[..., np.newaxis]
+    """Values -1…1 as colours: blue below 0, black at 0, orange above, at full strength from 0.5; NaN is magenta."""
+    amount = np.clip(2 * np.abs(np.nan_to_num(values, nan=0.0)), 0, 1)[..., np.newaxis]
     low, high = (np.array(color, np.float64) for color in ((90, 160, 255), (255, 150, 50)))
     colors = np.where(values[..., np.newaxis] < 0, low, high) * amount
     colors[np.isnan(values)] = _NAN_COLOR

@@ -282,7 +282,7 @@ def _light(comparison: Comparison) -> tuple[str, str, str]:
 
 
 def _error_by(comparison: Comparison) -> str:
-    rows, causes = [], []
+    rows = []
     for result in comparison.results:
         most = result.relative_mse or 0.0
         for place, one in enumerate(result.error_by):
@@ -293,11 +293,10 @@ def _error_by(comparison: Comparison) -> str:
                 f"<td>{escape(one.node)}</td><td>{escape(one.type)}</td><td>{escape(one.twin)}</td>"
                 f'<td class="num">{number(left)}{bar}</td>{_cell("–" if cut is None else f"{100 * cut:+.1f} %")}</tr>'
             )
-            if place == 0 and cut is not None and cut > 0:
-                causes.append(f"Most of the error of {result.name} ({number(most)}) comes from {one.node}.")
     if not rows:
         return ""
-    words = f"<p>{escape(' '.join(causes))} Each technique was replaced by its exact twin in turn.</p>"
+    causes = "".join(f"<p>{escape(f'{r.name}: {r.cause}.')}</p>" for r in comparison.results if r.cause)
+    words = f"<p>Each technique was replaced by its exact twin in turn.</p>{causes}"
     heads = ["", "technique", "type", "twin", "#rel. MSE with the twin", "#reduction"]
     return "<h3>Where the error comes from</h3>" + words + table(heads, rows, "Error with each technique's twin")
 

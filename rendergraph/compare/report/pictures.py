@@ -83,17 +83,19 @@ def _figure(identity: str, source: str, caption: str) -> str:
 
 
 def signed_sheet(comparison: Comparison, most: int) -> str:
-    """Return the signed difference of each variant's light to a truth, with the mean; empty without a truth."""
+    """Return the signed difference of each variant's light to a truth; empty without a truth."""
     figures = []
     for result in comparison.results[:most]:
         if result.signed_map is not None:
             values = result.signed_map.astype("f4")
-            dark, bright = (float((values < 0).mean()), float((values > 0).mean()))
-            caption = f"{result.name}: {100 * dark:.0f} % of the pixels too dark, {100 * bright:.0f} % too bright"
+            dark, bright = float((values < -0.1).mean()), float((values > 0.1).mean())
+            caption = f"{result.name}: {100 * dark:.0f} % of the pixels are too dark by more than a tenth, "
+            caption += f"{100 * bright:.0f} % too bright"
             figures.append(_figure("", png(signed_map(values)), caption))
     if not figures:
         return ""
-    note = f"Blue is darker than {escape(comparison.reference.name)}, orange is brighter, and black is equal."
+    note = f"Blue is darker than {escape(comparison.reference.name)} and orange brighter, both at full strength "
+    note += "from a half; black is equal."
     return f'<div class="sheet">{"".join(figures)}</div><p class="quiet">{note}</p>'
 
 
