@@ -13,7 +13,7 @@ from rendergraph.expand import ViewTable
 from rendergraph.glsl.globals import declared_blocks, declared_samplers, globals_of
 from rendergraph.glsl.reachable import reachable_names
 from rendergraph.program.text import StageText, prefix, stage_texts, text_key
-from rendergraph.program.unbound import unbound, unfit_uniforms, uniform_kinds
+from rendergraph.program.unbound import unbound, uniform_kinds
 from rendergraph.stamps import FileCache
 from rendergraph.steps import Read, Resource, Step
 from rendergraph.textures import FORMATS, GLSL_SHAPES, TextureDesc
@@ -75,14 +75,13 @@ def _check_step(
     _check_samplers(step, texts, resources)
     _check_outs(step, texts, types[step.node].cls, resources)
     found = missing(step, texts, types[step.node].cls)
-    found += [_placed(problem, text, [name]) for text, name, problem in unfit_uniforms(step, texts)]
     if any(problem.severity == "error" for problem in found):
         raise InputError([problem for problem in found if problem.severity == "error"])
     return (*found, *(warning for text in texts.values() for warning in text.warnings))
 
 
 def missing(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> list[Problem]:
-    """Return what the shaders of a step use and nothing provides, at the lines of the shaders."""
+    """Return what the shaders of a step use and nothing provides as declared, at the lines of the shaders."""
     return [_placed(problem, text, [name]) for text, name, problem in unbound(step, texts, cls)]
 
 

@@ -17,12 +17,14 @@ from rendergraph.program.text import StageText, prefix
 from rendergraph.steps import Read, Step, Write
 
 _VIEWS = re.compile(r"\b([A-Za-z_]\w*)_views\b")
+_BUFFER = re.compile(r"\bbuffer\s+([A-Za-z_]\w*)\s*\{")
 _UNIFORM = re.compile(
-    r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?(?!\w*(?:sampler|image))\w+\s+([A-Za-z_][\w\s,]*)[;=\[]"
+    r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?(?!\w*(?:sampler|image|only\b|coherent|volatile|restrict))\w+\s+([A-Za-z_][\w\s,]*)[;=\[]"
 )
 _TYPED = re.compile(
     r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?(float|int|uint|bool|[iu]?vec[234])\s+([A-Za-z_]\w*)\s*;"
 )
+_DECLARED = r"\buniform\b[^;{{}}]*\b{}\b"
 _CONSTANT_IF = re.compile(r"\bif\s*\([A-Z0-9_\s!=<>&|()+-]*[A-Z][A-Z0-9_\s!=<>&|()+-]*\)")
 
 
@@ -55,37 +57,28 @@ def unset_uniform(step: Step, name: str) -> str:
 
 
 def unbound(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> Iterator[tuple[StageText, str, Problem]]:
-    """Yield stage, name and problem of what a step's own shaders certainly use and nothing provides.
+    """Yield stage, name and problem of what authors' shaders certainly use and the step does not provide as declared.
 
     Warnings are about what a constant condition might exclude.
     """
-    uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
-    given = {use.name for use in uses}
-    given |= {prefix(each.node) + read.name for each in step.functions for read in each.reads}
-    set_names = {name for name, _ in step.uniforms} | {"view_index"}
-    set_names |= {prefix(each.node) + name for each in step.functions for name, _ in each.uniforms}
     for text in texts.values():
         blocks = [block for block in text.source.blocks if block.origin.file is not None and not block.origin.shared]
         own = "\n".join("\n".join(block.lines) for block in blocks)
-        found = dict(_suspects(step, own, text.text, given, set_names, cls))
+        found = list(_suspects(step, own, text.text, cls))
         if found:  # mostly in a branch that the step's macros exclude
             macros = [line for block in text.source.blocks if block.origin.file is None for line in block.lines]
             quick = compiled_text("\n".join([*macros, own]), certain=True)
-            found = {name: problem for name, problem in found.items() if re.search(rf"\b{name}\b", quick)}
-        buffers = [name for kind, name, _ in declared_blocks(own) if kind == "buffer" and name not in given]
-        if not found and not buffers:
+            found = [suspect for suspect in found if re.search(suspect[2], quick)]
+        if not found:
             continue
-        names = reachable_names(text.text, certain=True)
-        declared = compiled_text(text.text, certain=True)
-        for name, (code, describe) in found.items():
-            is_view = name.endswith("_views")
-            if name in names and (is_view or re.search(rf"\buniform\b[^;{{}}]*\b{name}\b", declared)):
-                one = step.problem(code, describe())
-                yield text, name, one if is_view or not _CONSTANT_IF.search(own) else one.as_warning()
-        for kind, name, members in declared_blocks(declared) if buffers else ():
-            if kind == "buffer" and name in buffers and not names.isdisjoint(members):
-                one = step.problem("RG430", unbound_block(step, name))
-                yield text, name, one if not _CONSTANT_IF.search(own) else one.as_warning()
+        names, declared = reachable_names(text.text, certain=True), compiled_text(text.text, certain=True)
+        has_blocks = any("buffer" in pattern for _, _, pattern, _ in found)
+        members = {block: named for _, block, named in declared_blocks(declared)} if has_blocks else {}
+        for code, name, pattern, describe in found:
+            if not names.isdisjoint(members.get(name, {name})) and re.search(pattern, declared):
+                problem = step.problem(code, describe())
+                undeclared = name.endswith("_views")
+                yield text, name, problem if undeclared or not _CONSTANT_IF.search(own) else problem.as_warning()
 
 
 def uniform_kinds(step: Step) -> tuple[tuple[str, int, bool], ...]:
@@ -97,44 +90,41 @@ def uniform_kinds(step: Step) -> tuple[tuple[str, int, bool], ...]:
     return tuple(found)
 
 
-def unfit_uniforms(step: Step, texts: Mapping[str, StageText]) -> Iterator[tuple[StageText, str, Problem]]:
-    """Yield stage, name and problem of uniforms that are declared with another type than the step gives (RG436)."""
-    given = {name: (count, floats) for name, count, floats in uniform_kinds(step)}
-    values = dict(step.uniforms)
-    for text in texts.values():
-        blocks = [block for block in text.source.blocks if block.origin.file is not None and not block.origin.shared]
-        own = "\n".join("\n".join(block.lines) for block in blocks if not block.origin.prefix)
-        declared = [(kind, name) for kind, name in _TYPED.findall(own) if name in given]
-        for kind, name in declared if len(dict.fromkeys(name for _, name in declared)) == len(declared) else ():
-            count, floats = given[name]
-            if count != (int(kind[-1]) if kind[-1].isdigit() else 1):
-                what = f"{count} number{'' if count == 1 else 's'}"
-            elif floats and kind[0] in "iub":
-                value = values[name]
-                what = f"floats, {(value[0] if isinstance(value, tuple | list) else value)!r}"
-            else:
-                continue
-            message = f"{_files(step)} declares '{name}' as {kind}, but it is given {what}"
-            if name in reachable_names(text.text, certain=True):
-                yield text, name, step.problem("RG436", message)
-
-
-def _suspects(
-    step: Step, own: str, whole: str, given: Collection[str], set_names: Collection[str], cls: type[Node]
-) -> Iterator[tuple[str, tuple[str, Callable[[], str]]]]:
-    """Yield names, with the code of the problem and what returns its text."""
-    ports = cls.ports()
+def _suspects(step: Step, own: str, whole: str, cls: type[Node]) -> Iterator[tuple[str, str, str, Callable[[], str]]]:
+    """Yield code, name, a pattern of the line that counts if it is compiled, and what returns the problem's text."""
+    uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
+    given = {use.name for use in uses}
+    given |= {prefix(each.node) + read.name for each in step.functions for read in each.reads}
+    kinds = {name: (count, floats) for name, count, floats in uniform_kinds(step)}
+    set_names = {prefix(each.node) + name for each in step.functions for name, _ in each.uniforms}
+    set_names |= {"view_index", *kinds, *given}
     for name in declared_samplers(own).keys() - given:
         if not (name.endswith("_texture") and step.kind == "geometry"):
-            yield name, ("RG430", partial(unbound_sampler, step, name, given, cls))
+            yield "RG430", name, _DECLARED.format(name), partial(unbound_sampler, step, name, given, cls)
     for stem in set(_VIEWS.findall(own)):
         port = stem.removeprefix("previous_")
-        if port in ports and f"{stem}_view_block" not in whole:
-            yield f"{stem}_views", ("RG430", partial(_without_views, step, port, given, cls))
+        if port in cls.ports() and f"{stem}_view_block" not in whole:
+            yield "RG430", f"{stem}_views", rf"\b{stem}_views\b", partial(_without_views, step, port, given, cls)
+    for name in _BUFFER.findall(own) if "buffer" in own else ():
+        if name not in given:
+            yield "RG430", name, rf"\bbuffer\s+{name}\b", partial(unbound_block, step, name)
     for names in _UNIFORM.findall(own):
         for name in re.findall(r"[A-Za-z_]\w*", names):
-            if name not in set_names and name not in given:
-                yield name, ("RG434", partial(unset_uniform, step, name))
+            if name not in set_names:
+                yield "RG434", name, _DECLARED.format(name), partial(unset_uniform, step, name)
+    for kind, name in _TYPED.findall(own):
+        count, floats = kinds.get(name, (0, False))
+        if count and (count != (int(kind[-1]) if kind[-1].isdigit() else 1) or (floats and kind[0] in "iub")):
+            yield "RG436", name, rf"\b{kind}\s+{name}\b", partial(_unfit_uniform, step, name, kind, count)
+
+
+def _unfit_uniform(step: Step, name: str, kind: str, count: int) -> str:
+    """Return what the declaration of a uniform and its value disagree about."""
+    size = int(kind[-1]) if kind[-1].isdigit() else 1
+    value = dict(step.uniforms)[name]
+    floats = f"floats, {(value[0] if isinstance(value, tuple | list) else value)!r}"
+    what = floats if count == size else f"{count} number{'' if count == 1 else 's'}"
+    return f"{_files(step)} declares '{name}' as {kind}, but it is given {what}"
 
 
 def _without_views(step: Step, port: str, given: Collection[str], cls: type[Node]) -> str:
