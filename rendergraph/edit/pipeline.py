@@ -128,7 +128,7 @@ class PipelineText(Struct, eq=False):
 
     def upgrade(self) -> None:
         """Rewrite what is spelt as in an earlier version: begin with the version of the format."""
-        if "rendergraph" in self._whole():
+        if "rendergraph" in self._whole() or "rendergraph" in self._own():
             return
         root = yaml_text.spans(self.text, ())[0]
         put = "rendergraph: 1" + ((yaml_text.BREAK.search(self.text) or ["\n"])[0] if root.block else ", ")
@@ -189,8 +189,10 @@ class PipelineText(Struct, eq=False):
         patch, problems = patch_of(
             resolve(self._document(), catalog=self.catalog).tree, settings, self._files().names_of
         )
-        if problems or patch is None:
+        if problems:
             raise InputError([replace(problem, place=None) for problem in problems])
+        if patch is None or not patch.mapping:  # `check` says more of it
+            raise _mistake("RG102", f"the type of node '{id}' does not exist; correct it first: retype {id} TYPE")
         path: yaml_text.Path = ()
         while isinstance(patch.data, dict) and len(path) < (4 if id and last not in ("type", "enabled") else 3):
             ((step, patch),) = patch.data.items()

@@ -183,6 +183,16 @@ def test_mistakes_are_told(words: tuple[Any, ...], code: str, message: str) -> N
     assert message in caught.value.problems[0].message
 
 
+def test_a_broken_file_can_be_mended_but_not_guessed_at() -> None:
+    broken = WHOLE.replace("type: tonemap", "type: tonemop")
+    with pytest.raises(InputError, match="retype display TYPE"):
+        edited(broken, "set", "display.exposure", 1)
+    assert edited(broken, "retype", "display", "tonemap") == WHOLE
+    for words in (("upgrade",), ("delete", "display")):
+        with pytest.raises(InputError, match="RG009"):
+            edited("[a]: 1\n" + WHOLE.replace("rendergraph: 1", "size: [8, 8]"), *words)
+
+
 @pytest.mark.parametrize("name", [*shipped_pipelines()][::6])
 def test_shipped_files_lose_nothing(name: str) -> None:
     """A node is added, renamed and deleted: what is left is the file, byte for byte."""
