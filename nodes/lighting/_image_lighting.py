@@ -49,7 +49,7 @@ class ImageLighting(SurfaceLighting):
         objects = steps.facts.objects
         wanted = {name for name, texture in SURFACE_TEXTURES.items() if texture.is_needed(needs, objects)}
         ports = [port for name, port in self.inputs().items() if name in wanted]
-        return _connected(steps, [self.depth, *ports])
+        return _connected(steps, [self.depth, *ports]) | self.energy_reads(steps)
 
     def per_sample(self, steps: Steps) -> dict[str, int]:
         """Return the macro of a step that lights each sample of a multisampled G-buffer."""

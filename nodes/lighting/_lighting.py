@@ -94,6 +94,10 @@ class Lighting(Node):
         default="exact",
         doc="Visibility term of `pbr`: Smith, or a fit without square roots. Anisotropic surfaces use Smith.",
     )
+    diffuse_lobe: Literal["lambert", "shared"] = define(
+        default="lambert",
+        doc="Diffuse lobe of `pbr`: of all the light, or of the share that the specular lobe does not reflect.",
+    )
     terms: Literal["all", "ambient", "diffuse", "specular", "emissive"] = define(
         default="all", doc="Show a single term; the four terms add up to `all`."
     )
@@ -131,7 +135,7 @@ class Lighting(Node):
 
     def record(self, steps: Steps) -> None:
         """Record the BRDF table, if surfaces reflect an environment."""
-        if "brdf_table" in self.ambient_reads(steps):
+        if "brdf_table" in self.ambient_reads(steps) | self.energy_reads(steps):
             steps.fullscreen("brdf_table.frag", out=self.brdf_table, defines={"TABLE_SAMPLES": 512}, label="table")
 
     def environment_reads(self, steps: Steps) -> dict[str, Any]:
@@ -147,6 +151,12 @@ class Lighting(Node):
         """Return what a shader reads for ambient lighting: the environment."""
         return self.environment_reads(steps)
 
+    def energy_reads(self, steps: Steps) -> dict[str, Any]:
+        """Return what a shader reads to leave to the diffuse lobe what the specular lobe does not reflect."""
+        needs = steps.needs("shading")
+        shares = self.diffuse_lobe == "shared" and "phong" not in needs and "nothing" not in needs
+        return {"brdf_table": self.brdf_table.sampled("linear")} if shares else {}
+
     def air_reads(self, steps: Steps) -> dict[str, Any]:
         """Return what a shader reads for the air in front of what it draws."""
         return {"air": self.air} if steps.connected(self.air) else {}
@@ -160,7 +170,7 @@ class Lighting(Node):
 
         This is the environment, the air, shadow functions and lists of lights.
         """
-        reads = self.environment_reads(steps) | self.air_reads(steps)
+        reads = self.environment_reads(steps) | self.energy_reads(steps) | self.air_reads(steps)
         return reads | ({"lookup": shadows, **self.light_list_reads(steps)} if self.wants_lights(steps) else {})
 
     def draw_transparent(
@@ -405,11 +415,14 @@ class GeometryLighting(SurfaceLighting):
             options: further arguments of `steps.geometry`, such as reads beside depth, shadows and occlusion.
         """
         connected = [port for port in (self.depth, self.visibility, self.occlusion) if steps.connected(port)]
-        reads: dict[str, Any] = {port.name: port for port in connected} | self.air_reads(steps)
+        reads: dict[str, Any] = (
+            {port.name: port for port in connected} | self.air_reads(steps) | self.energy_reads(steps)
+        )
         if options.get("per_light") is None:
             reads |= self.light_list_reads(steps)
         # `lookup` in any case: a step without reads would read all inputs.
-        steps.geometry(fragment, out=self.targets(steps), objects="opaque", lookup=self.lookup, **reads, **options)
+        reads = {"lookup": self.lookup, **reads, **options}
+        steps.geometry(fragment, out=self.targets(steps), objects="opaque", **reads)
 
     def draw_backdrop_and_transparent(self, steps: Steps, **shaders: Any) -> None:
         """Draw the environment behind the opaque surfaces, then transparent surfaces over both."""

@@ -8,7 +8,7 @@ uniform vec3 ambient;
 #endif
 #if defined(HAS_ENVIRONMENT) || defined(HAS_REFLECTIONS) || defined(WRITES_SPECULAR_ALBEDO)
 #define HAS_ENVIRONMENT_BRDF
-uniform sampler2D brdf_table;  // split-sum BRDF over (sqrt(NoV), roughness): the reflectance is f0 * x + f90 * y
+#include <brdf_table.glsl>
 #endif
 #endif
 
@@ -31,13 +31,7 @@ vec3 reflection_direction(Surface s) {
 // of the split sum (Karis 2013). The empirical shading models reflect none.
 vec3 specular_reflectance(Surface s) {
 #ifdef HAS_ENVIRONMENT_BRDF
-    float NoV = clamp(dot(s.normal, s.view_dir), 0.0, 1.0);
-    vec2 brdf = textureLod(brdf_table, vec2(sqrt(NoV), s.roughness), 0.0).xy;
-    vec3 reflectance = s.f0 * brdf.x + s.f90 * brdf.y;
-#if MULTIPLE_SCATTERING
-    reflectance *= 1.0 + s.f0 * (1.0 / max(brdf.x + brdf.y, 1e-3) - 1.0);  // see below
-#endif
-    return reflectance;
+    return ggx_albedo(s.f0, s.f90, clamp(dot(s.normal, s.view_dir), 0.0, 1.0), s.roughness);
 #else
     return vec3(0.0);
 #endif

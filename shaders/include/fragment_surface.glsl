@@ -114,6 +114,7 @@ Surface fragment_surface(View view) {
     lit = false;
 #endif
     material_surface(s, m, texels, flip_normal, lit);
+    share_energy(s);
 #ifdef ALPHA_MASK
     alpha_test(s.alpha, m.emissive.a);
 #endif

@@ -93,6 +93,7 @@ bool surface_at(ivec2 texel, int sample_index, out Surface s) {
     s.dielectric.rgb *= s.dielectric.rgb;
 #endif
     physical_reflectance(s, s.dielectric);
+    share_energy(s);
 #ifdef NEEDS_PHONG
     s.exponent = phong_exponent(s.roughness);
 #ifdef HAS_PHONG_DIFFUSE

@@ -39,6 +39,23 @@ void physical_reflectance(inout Surface s, vec4 dielectric) {
     s.f90 = mix(dielectric.a, 1.0, s.metallic);
 }
 
+#if defined(DIFFUSE_LOBE) && !defined(NEEDS_PHONG) && !defined(NEEDS_NOTHING)
+#if DIFFUSE_LOBE == DIFFUSE_LOBE_SHARED
+#define SHARES_ENERGY
+#include <brdf_table.glsl>
+#endif
+#endif
+
+// Leaves to the diffuse lobe only the light that the specular lobe of the dielectric part does not reflect. The
+// greatest channel counts, so that coloured reflections do not tint the diffuse lobe (KHR_materials_specular).
+void share_energy(inout Surface s) {
+#ifdef SHARES_ENERGY
+    float NoV = clamp(dot(s.normal, s.view_dir), 0.0, 1.0);
+    vec3 specular = ggx_albedo(s.dielectric.rgb, s.dielectric.a, NoV, s.roughness);
+    s.diffuse *= 1.0 - min(max(max(specular.r, specular.g), specular.b), 1.0);
+#endif
+}
+
 // The Phong exponent n with about the same highlight as GGX at a `roughness` from 0 to 1: 4 n = 2 / alpha² - 2.
 float phong_exponent(float roughness) {
     float alpha = max(roughness * roughness, 0.001);
