@@ -52,6 +52,9 @@ class Maps(Node):
         for layer in range(2):
             steps.geometry(None, out=self.maps.layer(layer), view=self.views, view_index=layer)
 
+    def update(self, frame: Any) -> None:
+        """Would set the views."""
+
 
 class Reads(Node):
     """What reads them."""
