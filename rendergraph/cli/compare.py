@@ -348,7 +348,10 @@ def truth_lines(comparison: Comparison) -> list[str]:
     if reference.noise is None:
         return []
     part = f", {100 * share:.2g} % of the smallest error" if share is not None else ""
-    lines = [f"noise of {reference.name} after {reference.samples} samples: relative MSE {reference.noise:.3g}{part}"]
+    lines = [
+        f"noise of {reference.name} after {reference.samples} samples: relative MSE {reference.noise:.3g}{part}; "
+        f"FLIP {reference.flip_noise:.2g}"
+    ]
     lines += [f"{result.name}: {result.cause}" for result in comparison.results if result.cause]
     return lines
 

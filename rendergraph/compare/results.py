@@ -42,6 +42,7 @@ class Reference:
         output: the name of the compared output.
         light: its scene-linear light, if any.
         noise: of a truth, the relative mean square error that its own noise adds to that of each variant.
+        flip_noise: the FLIP between its picture and one with as much noise again.
         samples: of a truth, the samples of a pixel.
     """
 
@@ -52,6 +53,7 @@ class Reference:
     output: str
     light: Pixels | None = None
     noise: float | None = None
+    flip_noise: float | None = None
     samples: int | None = None
 
     def __repr__(self) -> str:
@@ -59,7 +61,7 @@ class Reference:
 
     def as_json(self) -> dict[str, Any]:
         document = {"name": self.name, "kind": self.kind, "output": self.output}
-        return document | ({} if self.samples is None else {"samples": self.samples})
+        return document | ({} if self.noise is None else {"samples": self.samples, "flip_noise": self.flip_noise})
 
 
 @dataclass(frozen=True)

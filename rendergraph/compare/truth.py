@@ -29,7 +29,7 @@ from rendergraph.compare.tasks import ReferenceResult, origin_of
 from rendergraph.errors import RenderError
 from rendergraph.farm import Handle, Task, Worker
 from rendergraph.images.files import write_file
-from rendergraph.metrics import Encoding, colors, relative_mse, relative_noise
+from rendergraph.metrics import Encoding, colors, measure, relative_mse, relative_noise
 from rendergraph.session import RenderOptions, stages
 
 if TYPE_CHECKING:
@@ -61,6 +61,11 @@ class Truth:
     def noise(self) -> float:
         """The relative mean square error that the light has by its variance; NaN if a value is not finite."""
         return relative_noise(self.variance, self.radiance)
+
+    def with_noise_again(self) -> npt.NDArray[np.float32]:
+        """Return the light with normally distributed noise of its variance, the same in all channels of a pixel."""
+        normal = np.random.default_rng(0).standard_normal((*self.radiance.shape[:2], 1), dtype=np.float32)
+        return np.asarray(self.radiance + np.sqrt(np.maximum(self.variance, 0)) * normal, np.float32)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -96,7 +101,8 @@ class TruthTask(Task):
             _save(self.key, found)
         base = self.base.plan(worker)
         assert self.base.light is not None
-        pixels = displayed(worker.gpu, base, self.base.light, found.radiance, self.base.output, frame)
+        lights = [found.radiance, found.with_noise_again()]
+        pixels, noisy = (displayed(worker.gpu, base, self.base.light, p, self.base.output, frame) for p in lights)
         reference = Reference(
             name=self.truth.name,
             kind="pipeline",
@@ -105,6 +111,7 @@ class TruthTask(Task):
             output=self.base.output,
             light=found.radiance,
             noise=found.noise,
+            flip_noise=measure(noisy, pixels, encoding=self.encoding)[0].flip,
             samples=found.samples,
         )
         yield ReferenceResult(reference, origin_of(worker))

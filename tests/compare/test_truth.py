@@ -35,7 +35,7 @@ from rendergraph.compare.light import displayed, light_of
 from rendergraph.compare.report import comparison_page, sweep_page
 from rendergraph.compare.results import TwinError
 from rendergraph.errors import InputError, UsageError
-from rendergraph.metrics import relative_mse, relative_noise, signed_difference
+from rendergraph.metrics import measure, relative_mse, relative_noise, signed_difference
 
 SIZE = (24, 12)
 SPREAD = 0.125
@@ -257,6 +257,9 @@ def test_light_is_compared_before_bloom_and_pictures_with_the_exposure_of_the_fi
     assert np.abs(result.pixels[..., :3] / 255 - own).max() < 1 / 255
     planned = pipeline.check()
     assert str(light_of(planned.linked.graph)) == "light.radiance"
+    exact = displayed(gl, planned, light_of(planned.linked.graph), _exact_light(), "image", 1)
+    noise = measure(exact, found.reference.pixels)[0].flip  # the real one; the estimate knows the variance alone
+    assert found.reference.flip_noise == pytest.approx(noise, rel=0.25)
     shown = displayed(gl, planned, light_of(planned.linked.graph), _approximate_light(), "image", 1)
     assert np.array_equal(shown, result.pixels)  # its own light gives its own picture
 

@@ -276,7 +276,7 @@ def _light(comparison: Comparison) -> tuple[str, str, str]:
     noise = (
         f"<p>Light is measured before bloom and display, against {reference.samples} samples of each pixel of "
         f"<code>{escape(reference.name)}</code>. Their own noise adds {number(reference.noise)} to each relative mean "
-        f"square error{part}.</p>"
+        f"square error{part}. As much noise again changes the picture by a FLIP of {number(reference.flip_noise)}.</p>"
     )
     return noise, signed_sheet(comparison, MOST_COLUMNS), _error_by(comparison)
 
