@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from rendergraph.catalog import Catalog
 from rendergraph.document import Document, Source, YamlLimits, from_plain, parse, shown
@@ -190,7 +189,7 @@ class PipelineText(Struct, eq=False):
             resolve(self._document(), catalog=self.catalog).tree, settings, self._files().names_of
         )
         if problems:
-            raise InputError([replace(problem, place=None) for problem in problems])
+            raise InputError(problems)
         if patch is None or not patch.mapping:  # `check` says more of it
             raise _mistake("RG102", f"the type of node '{id}' does not exist; correct it first: retype {id} TYPE")
         path: yaml_text.Path = ()
