@@ -13,7 +13,7 @@ from rendergraph.compare.space import MOST_RUNS, RANGE, Axis, Sampling, Space, a
 from rendergraph.document import Value, load
 from rendergraph.errors import InputError, Problem
 from rendergraph.keys import Codes, Key, MapOf, Table, Validator, plain
-from rendergraph.keys.values import TEXT, choice, listed, shipped, version, whole, word
+from rendergraph.keys.values import TEXT, choice, listed, number, shipped, version, whole, word
 from rendergraph.read import SIZE, entries
 from rendergraph.resources import is_name, shipped_pipelines, shipped_scenes
 
@@ -62,6 +62,11 @@ SWEEP = Table(
         ),
         Key("budget", whole(1, MOST_RUNS), "Maximum number of runs of the search.", default=50),
         Key("reference", shipped(shipped_pipelines), "A picture or a pipeline that all runs are compared with."),
+        Key(
+            "reference_noise", number(0, above=True), "Draw a truth until its noise is this part of the smallest error."
+        ),
+        Key("reference_samples", whole(1), "Draw at most so many samples of each of its pixels."),
+        Key("reference_seconds", number(0, above=True), "Draw it at most so long."),
         Key("metric", TEXT, "A port, `NODE.PORT`, whose texture is measured instead of the picture."),
         Key("scene", shipped(shipped_scenes), "The scene, instead of the pipeline's own."),
         SIZE,
@@ -140,6 +145,7 @@ def read_sweep(path: Path) -> SweepFile:
 
 
 _OPTIONS = {"metric": "metric", "frames": "frames", "repeats": "repeats", "keep": "kept", "budget": "budget"}
+_OPTIONS |= {name: name for name in ("reference_noise", "reference_samples", "reference_seconds")}
 """Key to attribute of `SweepOptions`."""
 
 

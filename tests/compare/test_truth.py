@@ -30,10 +30,11 @@ from rendergraph.api import (
     param,
 )
 from rendergraph.catalog import Catalog
-from rendergraph.compare import compare, sweep
+from rendergraph.compare import SweepOptions, compare, sweep
 from rendergraph.compare.light import displayed, light_of
 from rendergraph.compare.report import comparison_page, sweep_page
 from rendergraph.compare.results import TwinError
+from rendergraph.compare.sweepfile import read_sweep
 from rendergraph.errors import InputError, UsageError
 from rendergraph.metrics import measure, relative_mse, relative_noise, signed_difference
 
@@ -353,6 +354,15 @@ def test_sweeps_measure_against_the_truth_and_resume(make: Maker, gl: rg.Session
     lines = [json.loads(line) for line in (tmp_path / "out" / "results.jsonl").read_text().splitlines()]
     assert [line["relative_mse"] for line in lines] == list(errors.values())
     assert "Light against the truth" in sweep_page(found, "command")
+
+
+def test_a_sweep_s_file_has_the_limits_of_its_truth(tmp_path: Path) -> None:
+    limits = {"reference_noise": 0.02, "reference_samples": 64, "reference_seconds": 5}
+    text = {"sweep": 1, "pipeline": "forward", "axes": {"shadows.taps": [1, 3]}, "reference": "./truth.yaml", **limits}
+    (tmp_path / "study.yaml").write_text(yaml.safe_dump(text, sort_keys=False))
+    file = read_sweep(tmp_path / "study.yaml")
+    assert {name: file.options[name] for name in limits} == limits
+    assert SweepOptions(**file.options).limits.most_samples == 64
 
 
 def test_the_report_shows_where_light_is_wrong_and_why(make: Maker, gl: rg.Session) -> None:
