@@ -26,11 +26,13 @@ GROUPS = {
     ),
     "Light and shading": (
         "shading lighting lights radiance air environment_lighting environment equirectangular cube brdf "
-        "anisotropic_ggx disc_form_factor"
+        "brdf_table anisotropic_ggx disc_form_factor"
     ),
     "The scene as data": "scene previous_scene trace",
     "Vertex shaders": "transform geometry_vertex material_vertex mask_vertex",
-    "Colour and numbers": ("srgb luminance color_temperature layer_colors math noise hammersley downsample text"),
+    "Colour and numbers": (
+        "srgb luminance color_temperature layer_colors math noise hammersley ray_directions downsample text"
+    ),
 }
 """Sections of the page; a file that none of them names is in the last."""
 
@@ -49,6 +51,9 @@ ARGUMENTS = {
     "tangent, bitangent": "unit vectors in world space, along the rows of the normal map and up its columns",
     "NoL, NoV, NoH, VoH": "cosines between the normal (N), the light (L), the viewer (V) and the half vector (H)",
     "alpha": "of microfacets, the squared roughness, 0.001 to 1; of colours, opacity from 0 to 1",
+    "roughness": "perceptual, from 0 to 1; its square is `alpha`",
+    "xi": "a point in the unit square",
+    "pixel": "integer coordinates in the picture, from the bottom left",
     "f0, f90": "specular reflectance at normal and at grazing incidence, linear RGB and one number",
     "material": "index of a material in `materials`",
     "light": "index of a light in `lights`, a `Light`, or a `ReflectedLight`: its diffuse and specular radiance",

@@ -15,8 +15,8 @@ vec2 random_shift(ivec2 pixel, int seed) {
     return vec2(v.xy >> 8u) * (1.0 / 16777216.0);
 }
 
-// Point i of the R2 sequence in the unit square, shifted (M. Roberts, "The Unreasonable Effectiveness of Quasirandom
-// Sequences", 2018).
+// Point i of the R2 sequence in the unit square, moved by `shift`, which wraps around (M. Roberts, "The Unreasonable
+// Effectiveness of Quasirandom Sequences", 2018).
 vec2 shifted_point(int i, vec2 shift) {
     return fract(shift + float(i) * vec2(0.75487766624669276, 0.56984029099805327));
 }
@@ -34,7 +34,7 @@ vec3 cosine_direction(vec3 normal, vec2 xi) {
 }
 
 // A distance in metres that float32 coordinates at a point, computed from a depth texture or interpolated, are off by
-// at most. Rays begin that far above their surface.
+// at most. Rays begin that far above their surface. `view_distance` is its distance from the viewer, in metres.
 float ray_offset(vec3 position, float view_distance) {
     vec3 size = abs(position);
     return 1e-4 * max(max(size.x, size.y), max(size.z, abs(view_distance)));
