@@ -435,3 +435,27 @@ def test_relative_errors_are_those_of_numpy_in_float64() -> None:
     signed = signed_difference(np.zeros((2, 2, 3)), np.ones((2, 2, 3)))
     assert signed == pytest.approx(np.full((2, 2), -1 / 1.01))
     assert signed_difference(r, r) == pytest.approx(np.zeros((5, 7)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("executor", ["serial", "processes:2"])
+def test_traced_occlusion_explains_the_error_of_the_screen_s(
+    gl: rg.Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, executor: str
+) -> None:
+    """Against the same pipeline with many rays, whose variance is taken for 0, in this process and in others."""
+    monkeypatch.setenv("RENDERGRAPH_CACHE", str(tmp_path))
+    (tmp_path / "none.frag").write_text("out vec4 color;\nvoid main() { color = vec4(0.0); }\n")
+    (tmp_path / "truth.yaml").write_text(
+        "rendergraph: 1\nextends: traced-occlusion\nnodes:\n  ao: {params: {samples: 256}}\n"
+        "  none: {type: ./none.frag}\noutputs: {variance: none.color}\n"
+    )
+    options: Any = {"executor": executor} if executor != "serial" else {"session": gl}
+    pipeline = rg.load("ssao-gtao", size=(64, 36))
+    found = compare([pipeline, pipeline.set("ao.samples", 8)], str(tmp_path / "truth.yaml"), frames=1, **options)
+    for result in found.results:
+        (error,) = (one for one in result.error_by if one.node == "ao")
+        assert error.twin == "traced_occlusion"
+        assert error.reduction is not None
+        assert error.reduction > 0.8
+        assert result.cause.startswith("most of its error comes from ao")
+    assert found.reference.noise == 0
