@@ -201,11 +201,12 @@ class NodeCheck:
 
     def _note_keywords(self, compiled: CompiledStep) -> None:
         step, parameters = compiled.step, self.type.cls.parameters()
-        if step.node != self.type.name or step.where.caller is None or not compiled.all_draws:
+        caller = step.where.caller  # a base's keywords need not be for the shaders of those who extend it
+        if step.node != self.type.name or caller is None or Path(caller[0]).name != self.type.file.name:
             return
-        for name, _ in step.uniforms if step.kind != "upload" else ():
+        for name, _ in step.uniforms if compiled.all_draws else ():
             if name not in parameters:
-                key = step.where.caller, name
+                key = caller, name
                 used = any(name in draw.program.uniforms for draw in compiled.all_draws)
                 self.keywords[key] = self.keywords.get(key, False) or used
 
