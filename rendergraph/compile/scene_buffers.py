@@ -57,8 +57,9 @@ class SceneBuffers(Struct, eq=False):
             "scene_vertex_block": scene_data.vertex_data(packed),
             "scene_instance_block": instances,
             "scene_emitter_block": scene_data.emitter_data(scene, packed),
-            "scene_texture_block": scene_data.texture_data(scene, sizes, found),
         }
+        if found.arrays:
+            arrays["scene_texture_block"] = scene_data.texture_data(scene, sizes, found)
         most = device.limits["storage_block"]
         for name, array in arrays.items():
             if array.nbytes > most:
