@@ -413,11 +413,7 @@ def test_facts_know_the_bytes_and_only_readers_pay(bench: Any) -> None:
         assert bench.session.compile(plain).scene._data is None
     with bench.session.current():
         data = bench.session.compile(pipeline).scene.data
-        held = sum(
-            buffer.size
-            for name, buffer in data.buffers.items()
-            if name not in ("scene_texture_block", "scene_index_block")
-        )
+        held = sum(buffer.size for name, buffer in data.buffers.items() if name != "scene_index_block")
     facts, size, connected = noted[0]
     assert connected
     assert facts.bytes == size == held

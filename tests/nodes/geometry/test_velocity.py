@@ -209,3 +209,53 @@ def test_what_a_plugin_moves_is_followed_as_what_the_scene_moves(session: rg.Ses
     assert 0.02 < moving.mean() < 0.5
     np.testing.assert_allclose(drawn["standing"]["velocity"], drawn["keyed"]["velocity"], atol=2e-4)
     np.testing.assert_allclose(drawn["standing"]["image"].astype(int), drawn["keyed"]["image"], atol=2)
+
+
+QUAD = '''
+"""A square of its own."""
+
+from __future__ import annotations
+
+from rendergraph.api import Depth, Node, Output, Velocity
+
+
+class Quad(Node):
+    """The floor, by a draw step."""
+
+    depth = Output(Depth, format="depth32f", clear=0.0, doc="Depth.")
+    velocity = Output(Velocity, format="rg16f", clear=0.0, doc="Motion.")
+
+    def record(self, steps):
+        out = {"velocity": self.velocity, "depth": self.depth}
+        steps.draw("quad.frag", vertex="quad.vert", vertices=4, topology="triangle_strip", out=out)
+'''
+QUAD_SHADERS = {
+    "quad.vert": """
+#include <previous_pass_view.glsl>
+centroid out vec4 v_clip_position;
+centroid out vec4 v_previous_clip_position;
+void main() {
+    vec4 position = vec4(3.0 - 6.0 * (gl_VertexID & 1), -1.0, 3.0 - 6.0 * (gl_VertexID >> 1), 1.0);
+    gl_Position = v_clip_position = PASS_VIEW.view_projection * position;
+    v_previous_clip_position = PREVIOUS_PASS_VIEW.view_projection * position;
+}
+""",
+    "quad.frag": """
+#include <fragment_velocity.glsl>
+out vec2 velocity;
+void main() { velocity = fragment_velocity(); }
+""",
+}
+
+
+def test_a_draw_step_writes_velocity_as_geometry_steps_do(session: rg.Session, tmp_path: Path) -> None:
+    for name, text in {"quad.py": QUAD, **QUAD_SHADERS}.items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / "scene.yaml").write_text(STANDING + "orbit: {degrees_per_second: 60}\n")
+    text = "rendergraph: 1\nsize: [48, 32]\nnodes: {gbuffer: {type: gbuffer}, quad: {type: quad}}\n"
+    text += "outputs: {drawn: quad.velocity, velocity: gbuffer.velocity}\n"
+    (tmp_path / "quad.yaml").write_text(text)
+    pipeline = rg.load(tmp_path / "quad.yaml", scene=tmp_path / "scene.yaml", plugins=[tmp_path])
+    frame = list(session.frames(pipeline, frames=range(1, 4)))[-1]
+    assert np.abs(frame["velocity"]).max() > 0.01
+    np.testing.assert_allclose(frame["drawn"], frame["velocity"], atol=1e-4)
