@@ -9,6 +9,7 @@ from difflib import get_close_matches
 from msgspec import Struct
 from msgspec.structs import replace
 
+from rendergraph.catalog.types import shared_includes
 from rendergraph.glsl.source import SourceText
 
 _FORMS = (
@@ -29,6 +30,8 @@ _MOST_CANDIDATES = 3
 _CLOSE = 0.75
 _ENDS = re.compile(r"[;{}]\s*\Z|^\s*#")
 """Of a line behind which a new statement begins."""
+_DECLARES = r"^(?:struct\s+{0}\b|#\s*define\s+{0}\b|\w+\s+{0}\s*\()"
+"""A line at which a file declares a struct, a macro or a function of a name."""
 _BUILT_IN = """
 abs acos acosh all any asin asinh atan atanh barrier bitCount bitfieldExtract ceil clamp cos cosh cross dFdx
 dFdxCoarse dFdxFine dFdy dFdyCoarse dFdyFine degrees determinant distance dot equal exp exp2 faceforward findLSB
@@ -82,7 +85,9 @@ def causes(rows: Sequence[str], source: SourceText) -> list[DriverMessage]:
         elif statement not in begun and not re.search(r"\berror\b", message.text):
             kept.append(message)
         begun.add(statement)
-    return kept or errors[:1]
+    if kept or "NEW_IDENTIFIER" not in errors[0].text:
+        return kept or errors[:1]
+    return [replace(errors[0], text=errors[0].text + _unknown_type(source, errors[0].line))]
 
 
 def _read(row: str) -> DriverMessage | None:
@@ -132,6 +137,24 @@ def _statement(source: SourceText, line: int) -> int:
 
 def _near(text: str, known: set[str]) -> str:
     for name in _QUOTED.findall(text):
+        if include := _include_with(name):
+            return f"; #include <{include}> declares it"
         if close := get_close_matches(name, sorted(known), n=1, cutoff=_CLOSE):
             return f"; did you mean '{close[0]}'?"
+    return ""
+
+
+def _unknown_type(source: SourceText, line: int) -> str:
+    """Explain Mesa's word for a name that nothing declares, where it expects a type or has taken one for a value."""
+    for name in re.findall(r"[A-Za-z_]\w*", source.lines[line - 1]) if line <= len(source.lines) else ():
+        if not re.search(_DECLARES.format(name), source.text, re.MULTILINE) and (include := _include_with(name)):
+            return f": nothing declares '{name}'; #include <{include}> does"
+    return ": a name that nothing declares"
+
+
+def _include_with(name: str) -> str:
+    """Return the shared include that declares a function, struct or macro of that name, empty if none does."""
+    for file in sorted(shared_includes().glob("*.glsl")):
+        if re.search(_DECLARES.format(name), file.read_text(encoding="utf-8"), re.MULTILINE):
+            return file.name
     return ""

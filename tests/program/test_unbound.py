@@ -238,3 +238,32 @@ look = Function(ShadowLookup, shader="look.glsl", reads=(), doc="Shadow.")
         assert said.endswith(
             "look.glsl of node 'a' samples 'depth', which is not among the `reads` of its Function; add it there"
         )
+
+
+@pytest.mark.parametrize(
+    ("used", "said"),
+    [
+        ("PASS_VIEW.eye", "`PASS_VIEW' undeclared; #include <pass_view.glsl> declares it"),
+        (
+            "fragment_surface(camera).alpha",
+            "no function with name 'fragment_surface'; #include <fragment_surface.glsl>",
+        ),
+    ],
+)
+def test_the_include_that_declares_a_name(author: Any, gl: rg.Session, used: str, said: str) -> None:
+    author.node(BODY)
+    author.write(wrong__frag=main_of(used))
+    if "Mesa" not in str(gl.device.as_json()["version"]):
+        pytest.skip("in Mesa's words")
+    (message,) = author.said(lambda: gl.render(author.pipeline(TEXT)))
+    assert said in message
+
+
+def test_the_include_that_declares_a_type(author: Any, gl: rg.Session) -> None:
+    author.node(BODY)
+    author.write(wrong__frag="struct Own { Surface surface; };\n" + main_of("1.0"))
+    if "Mesa" not in str(gl.device.as_json()["version"]):
+        pytest.skip("in Mesa's words")
+    (message,) = author.said(lambda: gl.render(author.pipeline(TEXT)))
+    assert message.startswith("wrong.frag:1:14: RG410 ")
+    assert message.endswith("NEW_IDENTIFIER: nothing declares 'Surface'; #include <surface.glsl> does")
