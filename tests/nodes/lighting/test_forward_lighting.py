@@ -14,7 +14,7 @@ import rendergraph as rg
 from rendergraph.scene.load import load
 
 Floats = npt.NDArray[np.float64]
-BARE = ("light.lookup=null", "light.ambient=0")
+BARE = ("light.lookup=null", "light.environment=null", "light.ambient=0")
 
 
 def render(session: rg.Session, pipeline: str, scene: Path | str, size: tuple[int, int], *sets: str) -> Floats:
