@@ -16,6 +16,7 @@ SIZE = (64, 48)
 PLAIN = {"light.shading=phong", "light.environment=null", "light.shading=unlit"}
 PARTS = ("direct_diffuse", "direct_specular", "environment_reflection", "specular_albedo", "irradiance")
 VARIANTS = (
+    ("ssao-hemisphere", ()),
     ("forward", ()),
     ("deferred", ()),
     ("forward", ("light.shading=phong",)),
