@@ -584,3 +584,21 @@ def test_tracing_needs_rays_and_only_the_scene_has_them(bench: Any) -> None:
     assert "of trees for rays; it is" in traced_too.plan().reasons["the scene's data"]
     with bench.session.current():
         assert bench.session.compile(traced_too).scene.tree().size <= facts.trees < facts.bytes
+
+
+def test_images_that_only_arrays_were_made_of_are_freed(bench: Any, shared: Path) -> None:
+    asset = shared / "assets" / "gltf" / "BoxTextured.glb"
+    (bench.folder / "plain.yaml").write_text(
+        "rendergraph: 1\nsize: [16, 8]\nnodes: {gbuffer: {type: gbuffer}}\noutputs: {image: gbuffer.albedo}\n"
+    )
+    plain = rg.load(bench.folder / "plain.yaml", scene=asset)
+    before = bench.session.render(plain)["image"]
+    text = PLACE.replace("scene_instances[1].rows[0].w", "scene_alpha(0, 0, vec2(0.3))")
+    pipeline = bench.pipeline(ONE, Of, shaders={"of.frag": text}).with_scene(asset)
+    with rg.Session() as session, session.current():
+        gpu_scene = session.compile(pipeline).scene
+        assert len(gpu_scene.data.textures) == 1
+        assert not gpu_scene._images
+        assert session.compile(plain).scene is gpu_scene
+        assert len(gpu_scene._images) == 1
+        np.testing.assert_array_equal(session.render(plain)["image"], before)
