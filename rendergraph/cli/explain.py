@@ -184,8 +184,11 @@ def _scene_text(entry: Entry) -> str:
         f"{entry['scene']}  (scene, {entry['triangles']} triangles{', animated' if entry['moves'] else ''})",
         entry["line"],
         listed("Objects", objects, ("name", "triangles", "material", ""), right=(1,)),
+        listed("Clips", [(one["name"], f"{one['seconds']:g} s") for one in entry["clips"]]),
+        listed("Materials", [(one["name"], one["line"]) for one in entry["materials"]]),
         listed("Lights", [(one["name"], one["line"]) for one in entry["lights"]]),
         section("Cameras", [(one["name"], one["line"]) for one in entry["cameras"]]),
+        f"It uses the extensions {', '.join(entry['extensions'])}." if entry["extensions"] else "",
         *entry["added"],
         f"`rendergraph run forward --scene {entry['name']}` renders it.",
     )

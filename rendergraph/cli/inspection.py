@@ -13,6 +13,7 @@ from rendergraph.cli import options
 from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import amount, emit, emit_json, say, warn
 from rendergraph.errors import InputError, Problem, UsageError, suggestion
+from rendergraph.formatting import format_bytes
 
 if TYPE_CHECKING:
     from rendergraph.session import Selection
@@ -102,11 +103,21 @@ def plan(
     from rendergraph.session import RenderOptions, stages
 
     render_options = RenderOptions(alias=not no_alias, heap=heap, shuffle=shuffle)
-    plan = stages.plan(stages.expand(options.link(selection), render_options)).plan
+    linked = options.link(selection)
+    plan, posing = stages.plan(stages.expand(linked, render_options)).plan, None
+    if any(placed.pose is not None for placed in linked.scene.objects):
+        from rendergraph.scene.rig import posing_figures  # for animated meshes alone
+
+        posing = posing_figures(linked.scene)
     if as_json:
-        emit_json(diagrams.plan_json(plan))
-    else:
-        emit(diagrams.plan_text(plan, every_step=every_step).rstrip("\n"))
+        emit_json(diagrams.plan_json(plan) | ({"posing": posing} if posing else {}))
+        return
+    if posing:
+        emit(
+            "before step 1, where a pose has changed\n  {meshes} animated meshes, {vertices} vertices".format(**posing)
+        )
+        emit(f"  a compute shader writes the streams that all steps read; it has {format_bytes(posing['bytes'])}\n")
+    emit(diagrams.plan_text(plan, every_step=every_step).rstrip("\n"))
 
 
 @click.command("graph", no_args_is_help=True)

@@ -42,9 +42,8 @@ _MOST_PARTS = 64
 
 
 _OF_INSTANCES = {
-    "scene_instance_block": "instances",
-    "scene_tree_block": "instances",
-    "scene_previous_block": "instances before",
+    **dict.fromkeys(("scene_instance_block", "scene_vertex_block", "scene_tree_block"), "instances"),
+    **dict.fromkeys(("scene_previous_block", "scene_previous_position_block"), "instances before"),
 }
 """Blocks of the scene's data that change with other sources."""
 

@@ -6,12 +6,13 @@ import os
 from collections import Counter
 from collections.abc import Callable, Hashable
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 from msgspec import Struct, field
+from msgspec.structs import replace
 
 from rendergraph.compile.culling import commands
 from rendergraph.compile.programs import ProgramCache
@@ -31,6 +32,9 @@ from rendergraph.scene.scene_data import data_macros, place_instances, used_text
 from rendergraph.scene.tree_data import MeshTrees, mesh_trees, object_rows
 from rendergraph.textures import TextureDesc, full_mip_count
 
+if TYPE_CHECKING:
+    from rendergraph.compile.posing import Posing
+
 DecodeLight = Callable[[ImageSource | MadeImage], npt.NDArray[Any]]
 """The picture around a scene, likewise."""
 
@@ -44,16 +48,19 @@ _STREAMS = {
     "in_color": ("colors", "4f"),
 }
 """Vertex attributes with the arrays of `PackedScene` and moderngl's formats."""
+_POSED = ("in_position", "in_normal", "in_tangent")
 _ABSENT = {"in_tangent": (0.0, 0.0, 0.0, 0.0), "in_uv0": (0.0, 0.0), "in_uv1": (0.0, 0.0), "in_color": (1.0,) * 4}
 """What an attribute holds that no mesh of the scene has; `pack` fills the same in for a mesh that lacks it."""
 _INSTANCE_FORMAT = (("in_object0", "4f"), ("in_object1", "4f"), ("in_object2", "4f"), ("in_ids", "2i"))
-PREVIOUS_ATTRIBUTES = ("in_previous0", "in_previous1", "in_previous2")
+_PREVIOUS_FORMAT = (("in_previous0", "4f"), ("in_previous1", "4f"), ("in_previous2", "4f"), ("", "2i"))
 """The same rows in the frame before."""
-_PREVIOUS_FORMAT = (*((name, "4f") for name in PREVIOUS_ATTRIBUTES), ("", "2i"))
+_PREVIOUS_POSITION = "in_previous_position"
+PREVIOUS_ATTRIBUTES = (*(name for name, _ in _PREVIOUS_FORMAT if name), _PREVIOUS_POSITION)
 SCENE_ATTRIBUTES = {
     **{name: layout for name, (_, layout) in _STREAMS.items()},
     **dict(_INSTANCE_FORMAT),
-    **dict.fromkeys(PREVIOUS_ATTRIBUTES, "4f"),
+    **{name: layout for name, layout in _PREVIOUS_FORMAT if name},
+    _PREVIOUS_POSITION: "3f",
 }
 """What a vertex shader that draws the scene may read, with moderngl's formats."""
 _SECTIONS = {"objects": "instances", "materials": "material_block", "lights": "light_block"}
@@ -92,6 +99,7 @@ class GpuScene(Struct, eq=False, dict=True):
     _before: moderngl.Buffer | None = None
     _data: SceneBuffers | None = None
     _tree: tuple[MeshTrees, moderngl.Buffer] | None = None
+    _posing: Posing | None = None
     _stale_instances: set[int] = set()  # objects that have moved since the frame before was kept
 
     def __post_init__(self) -> None:
@@ -107,6 +115,11 @@ class GpuScene(Struct, eq=False, dict=True):
         for block, records in pack.blocks(packed).items():
             if records.size:
                 self._blocks[block] = (ctx.buffer(records.tobytes()), block in stored)
+        if packed.vertex_orders:
+            from rendergraph.compile.posing import Posing  # for animated meshes alone
+
+            streams = {_STREAMS[name][0]: buffer for name, (buffer, _) in self._streams.items() if name in _POSED}
+            self._posing = Posing.make(self.device, self.scene, packed, streams)
 
     @property
     def light_defines(self) -> dict[str, str]:
@@ -129,9 +142,13 @@ class GpuScene(Struct, eq=False, dict=True):
             else:
                 self.device.bind_block(buffer, FIXED_BLOCKS[name])
 
-    def update(self, scene: Scene) -> None:
-        """Take over an animated scene's lights and transforms; the meshes stay."""
-        packed = pack.update(self.packed, self.scene, scene)
+    def update(self, scene: Scene) -> bool:
+        """Take over an animated scene's lights, transforms and poses; the meshes stay.
+
+        Returns:
+            Whether vertices have been posed, with buffers bound to points that steps use.
+        """
+        packed, has_posed = pack.update(self.packed, self.scene, scene), False
         for block, now, before in (
             ("light_block", packed.lights, self.packed.lights),
             ("material_block", packed.materials, self.packed.materials),
@@ -141,8 +158,13 @@ class GpuScene(Struct, eq=False, dict=True):
                 self._blocks[block][0].write(now.tobytes())
                 self.changes[block] += 1
         if packed.instances is not self.packed.instances:
-            moved = np.array(changed_objects(self.scene, scene), np.int64)
-            moved = moved[packed.instances[moved] != self.packed.instances[moved]]
+            changed = changed_objects(self.scene, scene)
+            if self._posing is not None:
+                poses = {placed.mesh: placed.pose for n in changed if (placed := scene.objects[n]).pose is not None}
+                has_posed = self._posing.update(poses)
+            moved = np.array(changed, np.int64)
+            if not has_posed:
+                moved = moved[packed.instances[moved] != self.packed.instances[moved]]
             if len(moved):
                 write_records(self._instances, packed.instances, moved)
                 self._stale_instances.update(moved.tolist())
@@ -152,18 +174,25 @@ class GpuScene(Struct, eq=False, dict=True):
                     write_records(self._data.buffers["scene_instance_block"], self._data.instances, moved)
                 if self._tree is not None:
                     trees, buffer = self._tree
+                    trees = self._mesh_trees() if has_posed else trees
                     buffer.write(object_rows(packed, self.data.instances["flags"], trees).tobytes())
+                    if has_posed:
+                        buffer.write(trees.rows.tobytes(), offset=buffer.size - trees.rows.nbytes)
+                    self._tree = trees, buffer
         for section in moving_plugin_keys(scene) & _SECTIONS.keys():
             pairs = zip(getattr(self.scene, section), getattr(scene, section), strict=True)
             self.changes[_SECTIONS[section]] += any(before.extra != now.extra for before, now in pairs)
         if scene.camera is not self.scene.camera:
             self.changes["camera"] += 1
         self.scene, self.packed = scene, packed
+        return has_posed
 
     def advance(self) -> None:
         """From now on where the objects are is where they were in the frame before; asked of what looks back."""
         if self._before is not None and self._stale_instances:
             write_records(self._before, self.packed.instances, np.array(sorted(self._stale_instances), np.int64))
+            self.changes["instances before"] += 1
+        if self._posing is not None and self._posing.advance():
             self.changes["instances before"] += 1
         self._stale_instances.clear()
 
@@ -176,15 +205,23 @@ class GpuScene(Struct, eq=False, dict=True):
             images = {key: self._images[texture.image, texture.srgb] for key, texture in used.items()}
             indices = self._indices["triangles"].buffer
             self._data = SceneBuffers.make(self.device, self.scene, self.packed, indices, images)
+            if self._posing is not None:
+                vertices = self._data.buffers["scene_vertex_block"]
+                self._posing.fill(vertices, vertices.size // (4 * len(self.packed.positions)))
         return self._data
 
     def tree(self) -> moderngl.Buffer:
         """The trees for `trace.glsl`, built when a program first looks at them."""
         if self._tree is None:
-            trees = mesh_trees(self.scene, self.packed)
+            trees = self._mesh_trees()
             rows = object_rows(self.packed, self.data.instances["flags"], trees)
             self._tree = trees, self.device.ctx.buffer(rows.tobytes() + trees.rows.tobytes())
         return self._tree[1]
+
+    def _mesh_trees(self) -> MeshTrees:
+        posing = self._posing
+        packed = self.packed if posing is None else replace(self.packed, positions=posing.positions())
+        return mesh_trees(self.scene, packed)
 
     @property
     def data_defines(self) -> dict[str, str]:
@@ -217,6 +254,8 @@ class GpuScene(Struct, eq=False, dict=True):
                 layout = " ".join(f if name in names else _PADDING[f] for name, f in formats)
                 buffer = self._instances if formats is _INSTANCE_FORMAT else self.previous()
                 content.append((buffer, f"{layout}/i", *used))
+        if _PREVIOUS_POSITION in names:
+            content.append((self.previous_positions(), "3f", _PREVIOUS_POSITION))
         return programs.vertex_array(program, (id(self), "scene", topology), content, self.indices(topology).buffer)
 
     def previous(self) -> moderngl.Buffer:
@@ -225,6 +264,10 @@ class GpuScene(Struct, eq=False, dict=True):
             self._stale_instances.clear()
             self._before = self.device.ctx.buffer(self.packed.instances.tobytes() or bytes(64))
         return self._before
+
+    def previous_positions(self) -> moderngl.Buffer:
+        """Object-space positions of all vertices in the frame before, likewise; those of today where none is posed."""
+        return self._posing.previous() if self._posing is not None else self._streams["in_position"][0]
 
     def _constant(self, name: str) -> tuple[moderngl.Buffer, str]:
         """One value once an instance: draws begin at the object's own instance, so a single one would not do."""
@@ -301,6 +344,8 @@ class GpuScene(Struct, eq=False, dict=True):
             self._data.release()
         if self._tree is not None:
             self._tree[1].release()
+        if self._posing is not None:
+            self._posing.release()
         if self._before is not None:
             self._before.release()
         for image in (*self._images.values(), *([self._environment] if self._environment else [])):

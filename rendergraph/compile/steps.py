@@ -372,6 +372,7 @@ class _Compiler(Struct, eq=False, dict=True):
                 held["scene_tree_block"] = self.scene.tree()
             if "scene_previous_block" in used:
                 held["scene_previous_block"] = self.scene.previous()
+                held["scene_previous_position_block"] = self.scene.previous_positions()
                 self.uses_previous = True
             self._check_stages(step, texts())
             for block in sorted(used & held.keys()):

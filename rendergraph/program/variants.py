@@ -79,7 +79,9 @@ def scene_macros(scene: Scene, packed: PackedScene, stored: Collection[str]) -> 
     """Return macros about objects and materials, for geometry steps; unused features are not compiled."""
     macros = {"MATERIAL_COUNT": str(max(1, len(scene.materials)))}
     moving = {path.partition(".")[0] for path in scene.keyframes}
-    if "objects" not in moving and _evenly_scaled(packed.instances["rows"]):
+    if packed.vertex_orders:
+        macros["SCENE_POSED"] = "1"
+    if "objects" not in moving and not scene.rigs and _evenly_scaled(packed.instances["rows"]):
         macros["UNIFORM_SCALE"] = "1"
     if "materials" not in moving:
         textured = {slot for material in scene.materials for slot in material.textures}

@@ -10,7 +10,7 @@ from rendergraph.reference.node_types import summary
 from rendergraph.resources import opening, shipped_pipelines, shipped_scenes
 
 if TYPE_CHECKING:
-    from rendergraph.scene.model import Camera, Light, Scene
+    from rendergraph.scene.model import Camera, Light, Material, Scene
     from rendergraph.session.values import Linked
 
 _MESHES = (".obj", ".gltf", ".glb")
@@ -53,7 +53,7 @@ def describe_pipeline(name: str, linked: Linked) -> dict[str, Any]:
 
 
 def describe_scene(name: str, path: Path, scene: Scene) -> dict[str, Any]:
-    from rendergraph.scene.animate import complete  # other topics need no scene
+    from rendergraph.scene.animate import complete, moves  # other topics need no scene
 
     triangles = [mesh.indices.size // 3 for mesh in scene.meshes]
     added = [] if scene.cameras else ["It has no camera: one is added in front, above and to the right."]
@@ -74,11 +74,36 @@ def describe_scene(name: str, path: Path, scene: Scene) -> dict[str, Any]:
             }
             for one in scene.objects
         ],
+        "clips": [
+            {"name": clip.name, "seconds": round(clip.length, 3)} for rig in scene.rigs for clip in rig.clips.values()
+        ],
+        "materials": [{"name": one.name, "line": _material(one)} for one in scene.materials],
+        "extensions": _extensions(path),
         "lights": [{"name": light.name, "line": _light(light)} for light in scene.lights],
         "cameras": [{"name": name, "line": _camera(camera)} for name, camera in scene.cameras.items()],
         "added": added,
-        "moves": bool(scene.keyframes or scene.orbit),
+        "moves": moves(scene),
     }
+
+
+def _extensions(path: Path) -> list[str]:
+    """The extensions that a glTF file uses."""
+    if path.suffix.lower() not in (".gltf", ".glb"):
+        return []
+    from rendergraph.scene.gltf import used_extensions  # for such files alone
+
+    return used_extensions(path.read_bytes())
+
+
+def _material(material: Material) -> str:
+    facts = [
+        f"metallic {material.metallic:g}, roughness {material.roughness:g}",
+        "" if material.alpha_mode == "opaque" else f"alpha {material.alpha_mode}",
+        "double-sided" if material.double_sided else "",
+        "unlit" if material.unlit else "",
+        f"textures: {', '.join(material.textures)}" if material.textures else "",
+    ]
+    return ", ".join(filter(None, facts))
 
 
 def _light(light: Light) -> str:

@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from itertools import chain
-from typing import Any
+from collections.abc import Iterable, Mapping
+from itertools import chain, compress
+from operator import is_not
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from msgspec.structs import replace
+from msgspec.structs import astuple, replace
 
 from rendergraph.errors import InputError, Option, Place, Problem, suggestion
 from rendergraph.facts import NO_EXTRA, Extra
 from rendergraph.scene import scene_values
 from rendergraph.scene.cameras import WIDE, bounding_sphere, framing_camera
 from rendergraph.scene.geometry import rigid, translation
-from rendergraph.scene.model import Placement, Scene
+from rendergraph.scene.model import Matrix, Placement, Scene
 from rendergraph.scene.surroundings import lit
+
+if TYPE_CHECKING:
+    from rendergraph.scene.rig import Playback, Pose
+
+_MOMENTS = 12
+"""Of a clip that a framing camera looks at."""
 
 
 def complete(scene: Scene, camera_name: str | None = None, aspect: float = WIDE, *, bare: bool = False) -> Scene:
@@ -27,7 +34,7 @@ def complete(scene: Scene, camera_name: str | None = None, aspect: float = WIDE,
     """
     cameras = dict(scene.cameras)
     if not cameras:
-        cameras["default"] = framing_camera(scene, aspect)
+        cameras["default"] = framing_camera(_over_clips(scene), aspect)
     if camera_name is not None:
         if camera_name not in cameras:
             text = f"the scene has no camera '{camera_name}'{suggestion(camera_name, cameras)}"
@@ -38,7 +45,21 @@ def complete(scene: Scene, camera_name: str | None = None, aspect: float = WIDE,
 
 
 def moves(scene: Scene) -> bool:
-    return bool(scene.keyframes) or scene.orbit is not None
+    return bool(scene.keyframes or scene.rigs) or scene.orbit is not None
+
+
+def play(scene: Scene, playback: Playback | None) -> Scene:
+    """Return the scene of an animated file with a clip playing, as it is at first; without one at rest for good."""
+    (rig,) = scene.rigs
+    if playback is not None:
+        clip = rig.clips[playback.clip or next(iter(rig.clips))]
+        return _posed(replace(scene, rigs=(replace(rig, clip=clip, playback=playback),)), 0.0)
+    scene, meshes = _posed(scene, 0.0), list(scene.meshes)
+    for placed in scene.objects:
+        if placed.pose is not None and meshes[placed.mesh].deform is not None:
+            meshes[placed.mesh] = meshes[placed.mesh].baked(placed.pose)
+    objects = tuple(replace(placed, pose=None) for placed in scene.objects)
+    return replace(scene, objects=objects, meshes=tuple(meshes), rigs=(), placements={})
 
 
 def moving_plugin_keys(scene: Scene) -> set[str]:
@@ -48,10 +69,10 @@ def moving_plugin_keys(scene: Scene) -> set[str]:
 
 
 def at(scene: Scene, time_s: float) -> Scene:
-    """The scene at a time in seconds: keyframes first, then the orbit. Meshes are shared, never copied."""
+    """The scene at a time in seconds: files' clips, then keyframes, then the orbit. Meshes are shared, never copied."""
     if not moves(scene):
         return scene
-    first = scene
+    first, scene = scene, _posed(scene, time_s)
     changed: dict[tuple[str, str], dict[str, Any]] = {}
     for path, frames in scene.keyframes.items():
         section, _, rest = path.partition(".")
@@ -66,7 +87,47 @@ def at(scene: Scene, time_s: float) -> Scene:
             values["extra"] = Extra({**recipe.get("extra", NO_EXTRA), **added})
         if values:
             scene = _changed(scene, section, name, {**recipe, **values})
-    return scene if scene.orbit is None else _orbited(scene, time_s, first if first.objects is scene.objects else scene)
+    stays = not any(
+        section == "objects" for section, _ in changed
+    )  # clips move what is around a target, not the target
+    return scene if scene.orbit is None else _orbited(scene, time_s, first if stays else scene)
+
+
+def _posed(scene: Scene, time_s: float) -> Scene:
+    """The scene with what its files' clips move, and where that is in each placement of a file."""
+    for rig in scene.rigs:
+        worlds, parts = rig.at(time_s)
+        objects, placements, moved = list(scene.objects), dict(scene.placements), {}
+        poses: dict[int, Pose] = {}
+        for name, _ in rig.placements:
+            before = placements[name]
+            now = placements[name] = Placement(
+                tuple((index, part[0]) for (index, _), part in zip(before.objects, parts, strict=True)),
+                tuple((index, worlds[node]) for (index, _), node in zip(before.lights, rig.lights, strict=True)),
+                tuple((camera, worlds[node]) for (camera, _), node in zip(before.cameras, rig.cameras, strict=True)),
+            )
+            moved[name] = Placement(
+                *(
+                    tuple(b for a, b in zip(*pair, strict=True) if not np.array_equal(a[1], b[1]))
+                    for pair in zip(astuple(before), astuple(now), strict=True)
+                )
+            )
+            for (index, _), (_, *state) in zip(now.objects, parts, strict=True):
+                number = objects[index].mesh
+                if scene.meshes[number].deform is not None:
+                    if number not in poses:
+                        poses[number] = scene.meshes[number].pose(*state)
+                    objects[index] = replace(objects[index], pose=poses[number])
+        scene = _placed_again(replace(scene, objects=tuple(objects), placements=placements), rig.placements, moved)
+    return scene
+
+
+def _over_clips(scene: Scene) -> Scene:
+    """The scene with its animated objects at several moments of their clips, for a camera that frames them all."""
+    longest = max((rig.length for rig in scene.rigs), default=0.0)
+    moments = [_posed(scene, longest * number / _MOMENTS).objects for number in range(1, _MOMENTS if longest else 0)]
+    changed = [placed for moment in moments for placed in compress(moment, map(is_not, moment, scene.objects))]
+    return replace(scene, objects=(*scene.objects, *changed)) if changed else scene
 
 
 def interpolated(frames: tuple[tuple[float, Any], ...], time_s: float) -> Any:
@@ -96,7 +157,8 @@ def _orbited(scene: Scene, time_s: float, placed: Scene) -> Scene:
 def _changed(scene: Scene, section: str, name: str, values: Mapping[str, Any]) -> Scene:
     """The scene with other values of one entry of a section."""
     if section == "objects":
-        return _placed_again(scene, name, values)
+        world, copies = scene_values.placed(values), scene.copies.get(("objects", name))
+        return _placed_again(scene, [(name, world)] if copies is None else copies.placed(name, world), scene.placements)
     if section == "environment":
         turn, intensity = math.radians(values.get("rotate_degrees", 0.0)), values.get("intensity", 1.0)
         if scene.environment is None:
@@ -132,11 +194,11 @@ def _with_extra(scene: Scene, name: str, added: Mapping[str, Any]) -> Scene:
     return replace(scene, objects=tuple(objects))
 
 
-def _placed_again(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
-    world, copies = scene_values.placed(values), scene.copies.get(("objects", name))
+def _placed_again(scene: Scene, copies: Iterable[tuple[str, Matrix]], placements: Mapping[str, Placement]) -> Scene:
+    """The scene with copies of files and shapes at other places, each with its transform."""
     objects, lights, cameras = list(scene.objects), list(scene.lights), dict(scene.cameras)
-    for copy, matrix in [(name, world)] if copies is None else copies.placed(name, world):
-        placement = scene.placements.get(copy, Placement())
+    for copy, matrix in copies:
+        placement = placements.get(copy, Placement())
         for index, local in placement.objects:
             objects[index] = replace(objects[index], transform=matrix @ local)
         for index, local in placement.lights:

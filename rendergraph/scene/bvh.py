@@ -14,6 +14,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
+from msgspec.structs import replace
 
 from rendergraph.scene.model import Floats
 
@@ -177,6 +178,24 @@ def build(boxes: Floats, sizes: Sequence[int], most: int = LEAF) -> list[Tree]:
     slot_boxes = slot_boxes[:, : 2 * node_count]
     slot_boxes[3:] *= -1
     return _separate(references, slot_boxes, owner[:node_count], order, depths, counts)
+
+
+def refit(tree: Tree, boxes: Floats) -> Tree:
+    """Return a tree over the same primitives, which have moved: the same nodes with the boxes that hold them now."""
+    levels, nodes = [], np.full(min(1, len(tree.children)), tree.root)
+    while len(nodes):
+        levels.append(nodes)
+        below = tree.children[nodes].reshape(-1)
+        nodes = below[below >= 0]
+    found, primitives = np.empty(tree.boxes.shape, np.float32), boxes.T[tree.order]
+    for nodes in reversed(levels):
+        children = tree.children[nodes]
+        first, more = np.divmod(np.maximum(-1 - children, 0), LEAF)
+        leaves = np.minimum.reduce([primitives[first + np.minimum(more, number)] for number in range(LEAF)])
+        inner = found[np.maximum(children, 0)].min(axis=2)
+        found[nodes] = np.where(children[:, :, None] < 0, leaves, inner)
+    found[:, :, 3:] *= -1
+    return replace(tree, boxes=found)
 
 
 def _separate(references: Ints, boxes: Floats, owner: Ints, order: Ints, depths: Ints, counts: Ints) -> list[Tree]:

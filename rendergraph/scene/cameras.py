@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,9 @@ from rendergraph import projection
 from rendergraph.scene.geometry import vec3
 from rendergraph.scene.model import Camera, Matrix, Scene, Vec3
 from rendergraph.steps import ViewMatrices
+
+if TYPE_CHECKING:
+    from rendergraph.scene.rig import Pose
 
 FRAMING_DIRECTION = (1.0, 0.6, 1.5)
 FRAMING_FOV = math.radians(45.0)
@@ -84,14 +88,14 @@ def _reaches(
     """The farthest extent of everything drawn along each of some directions, (n, 3), from a centre."""
     shown = [entry for entry in scene.objects if not entry.hidden]
     most = np.full(len(directions), -np.inf if shown else 0.5)
-    by_mesh: dict[int, list[npt.NDArray[np.float64]]] = {}
+    by_mesh: dict[tuple[int, Pose | None], list[npt.NDArray[np.float64]]] = {}
     for entry in shown:
-        by_mesh.setdefault(entry.mesh, []).append(entry.transform)
-    many = sum(len(scene.meshes[mesh].positions) * len(placed) for mesh, placed in by_mesh.items()) > most_points
-    for mesh, placed in by_mesh.items():
-        points = np.asarray(scene.meshes[mesh].positions, np.float64)
+        by_mesh.setdefault((entry.mesh, entry.pose), []).append(entry.transform)
+    many = sum(len(scene.meshes[mesh].positions) * len(placed) for (mesh, _), placed in by_mesh.items()) > most_points
+    for (mesh, pose), placed in by_mesh.items():
+        points = np.asarray(scene.meshes[mesh].baked(pose).positions, np.float64)
         if many:
-            low, high = (corner.astype(np.float64) for corner in scene.meshes[mesh].box)
+            low, high = (corner.astype(np.float64) for corner in (pose or scene.meshes[mesh]).box)
             corners = np.array(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij"))
             points = corners.reshape(3, -1).T
         transforms = np.array(placed)

@@ -12,7 +12,18 @@ import numpy.typing as npt
 
 from rendergraph.declare import CameraFacts, LightFacts, MaterialFacts
 from rendergraph.facts import SELECTIONS, ObjectFacts
-from rendergraph.scene.model import Camera, ImageSource, Light, Material, Mesh, Object, Scene, Vec3, changed_objects
+from rendergraph.scene.model import (
+    Camera,
+    ImageSource,
+    Light,
+    Material,
+    Mesh,
+    Object,
+    Scene,
+    Vec3,
+    boxes_of,
+    changed_objects,
+)
 from rendergraph.textures import TextureDesc, full_mip_count
 
 Corners: TypeAlias = npt.NDArray[np.float64]
@@ -146,10 +157,8 @@ class FrameScene:
 
 
 def corners_of(meshes: tuple[Mesh, ...], objects: tuple[Object, ...] | list[Object]) -> Corners:
-    used = {number: place for place, number in enumerate(dict.fromkeys(entry.mesh for entry in objects))}
-    boxes = np.array([meshes[number].box for number in used], np.float64).reshape(-1, 2, 3)
     transforms = np.array([entry.transform for entry in objects]).reshape(-1, 4, 4)
-    low, high = boxes[[used[entry.mesh] for entry in objects]].reshape(-1, 2, 3).swapaxes(0, 1)
+    low, high = boxes_of(meshes, objects)
     far = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], bool)
     local = np.where(far, high[:, None], low[:, None])
     placed: Corners = local @ transforms[:, :3, :3].swapaxes(1, 2) + transforms[:, None, :3, 3]

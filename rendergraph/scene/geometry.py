@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -83,21 +82,6 @@ def translation(at: npt.ArrayLike) -> Matrix:
     matrix = np.eye(4)
     matrix[:3, 3] = at
     return matrix
-
-
-def quaternion_matrix(x: float, y: float, z: float, w: float) -> Matrix:
-    """Rotation matrix (3, 3) of a quaternion, normalised first; a zero one is a ValueError."""
-    length = math.hypot(x, y, z, w)
-    if not length:
-        raise ValueError("a rotation of zero length")
-    x, y, z, w = x / length, y / length, z / length, w / length
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def euler_matrix(degrees: Sequence[float]) -> Matrix:

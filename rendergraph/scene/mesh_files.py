@@ -95,7 +95,7 @@ def _mesh(name: str, part: MeshData) -> Mesh:
     doubles = np.zeros(positions.shape) if normals is None else normals.astype(np.float64)
     filled, _ = filled_normals(positions, indices, doubles)
     has_area = face_normals(positions, indices).any(axis=1)
-    return Mesh(name, positions, indices[has_area], filled, **arrays)
+    return Mesh(name, positions, indices[has_area], filled, None, arrays["uv0"], arrays["uv1"], arrays["colors"])
 
 
 def _floats(key: str, values: npt.ArrayLike | None) -> Floats | None:

@@ -7,12 +7,12 @@ the origin at the image's top left.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from itertools import compress, count
 from operator import is_not
 from pathlib import Path
-from typing import Any, Literal, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,9 @@ from rendergraph.document import YamlLimits
 from rendergraph.facts import NO_EXTRA, Extra
 from rendergraph.scene.edges import Edges, find_edges, is_solid
 from rendergraph.stamps import Stamps
+
+if TYPE_CHECKING:
+    from rendergraph.scene.rig import Deform, Ints, Pose, Rig
 
 Floats: TypeAlias = npt.NDArray[np.float32]
 Matrix: TypeAlias = npt.NDArray[np.float64]
@@ -56,6 +59,7 @@ class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
         tangents: float32 (n, 4), w the handedness, or None: the shader derives them.
         uv0, uv1: float32 (n, 2), or None.
         colors: float32 (n, 4) linear, or None for white.
+        deform: how its vertices move, for an animated mesh; all else is then that of its bind pose.
     """
 
     name: str
@@ -66,6 +70,7 @@ class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
     uv0: Floats | None = None
     uv1: Floats | None = None
     colors: Floats | None = None
+    deform: Deform | None = None
 
     @cached_property
     def box(self) -> tuple[Floats, Floats]:
@@ -86,7 +91,7 @@ class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
         normal /= length
         away = np.stack([a, b, c]) @ normal
         low, high = self.box
-        if float(np.ptp(away)) > 1e-5 * float(np.linalg.norm(high - low)):
+        if self.deform is not None or float(np.ptp(away)) > 1e-5 * float(np.linalg.norm(high - low)):
             return None
         x, y, z = (float(value) for value in normal)
         return x, y, z, -float(away.mean())
@@ -100,7 +105,7 @@ class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
     def convex(self) -> bool:
         """Whether it is closed with every vertex behind every triangle; False, too, where it is too large to ask."""
         triangles = self.edges.triangles
-        if self.edges.gap or len(triangles) * len(self.positions) > _MOST_CONVEX:
+        if self.deform is not None or self.edges.gap or len(triangles) * len(self.positions) > _MOST_CONVEX:
             return False
         positions = self.positions.astype(np.float64)
         a, b, c = np.moveaxis(positions[triangles], 1, 0)
@@ -113,6 +118,34 @@ class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
     @cached_property
     def edges(self) -> Edges:
         return find_edges(self.positions, self.indices)
+
+    def baked(self, pose: Pose | None) -> Mesh:
+        """Return it as it is in a pose, to stay so; the same for None."""
+        if pose is None:
+            return self
+        from rendergraph.scene.rig import posed  # for animated meshes alone
+
+        return replace(self, deform=None, **{key: found.astype(np.float32) for key, found in posed(self, pose).items()})
+
+    def pose(self, joints: Matrix | None, weights: Matrix | None) -> Pose:
+        """Return a pose of it, with transforms of its joints, (j, 3, 4), and weights of its targets, (t,)."""
+        from rendergraph.scene.rig import pose_of  # for animated meshes alone
+
+        return pose_of(self, joints, weights)
+
+    @cached_property
+    def joint_boxes(self) -> tuple[Ints, Matrix, Matrix]:
+        """Joints that move some vertex, (u,), and the box of what each of them moves, (u, 3) twice."""
+        from rendergraph.scene.rig import joint_boxes  # likewise
+
+        return joint_boxes(self)
+
+    @cached_property
+    def target_boxes(self) -> tuple[Matrix, Matrix]:
+        """Least and greatest displacements of its morph targets, (t, 3) each."""
+        assert self.deform is not None
+        deltas = self.deform.targets["positions"].astype(np.float64)
+        return deltas.min(axis=1), deltas.max(axis=1)
 
 
 class SceneLimits(Struct, frozen=True):
@@ -244,6 +277,7 @@ class Object(Struct, frozen=True, eq=False):
         transform: object to world, float64 (4, 4), affine.
         node: the name of the node it is a part of, shared by the parts of one node (one for each material, or each
             instance); a scene file's `overrides` name it.
+        pose: what moves the vertices of an animated mesh; no object of another pose has this mesh.
     """
 
     name: str
@@ -254,6 +288,7 @@ class Object(Struct, frozen=True, eq=False):
     hidden: bool = False
     node: str = ""
     extra: Extra = NO_EXTRA
+    pose: Pose | None = None
 
 
 class Light(Struct, frozen=True):
@@ -357,7 +392,8 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         keyframes: dotted path to times in seconds and values, linear between, held outside.
         warnings: what a reader left out, replaced or clamped, once for each kind and file.
         recipe: section and name (`("cameras", "main")`) to the values in the scene file, which keyframes change.
-        placements: name of a scene file's object, or of one copy of it, to its parts.
+        placements: name of a scene file's object, or of one copy of it, to its parts; "" for all of an animated file.
+        rigs: what moves animated files.
         copies: section and name of a scene file's entry to its `repeat.Copies`.
         plugin_keys: section to the names of the plugins' keys that its file may use.
         files: every file accessed while reading it, as it was.
@@ -378,6 +414,7 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
     placements: Mapping[str, Placement] = field(default_factory=dict)
     copies: Mapping[tuple[str, str], Any] = field(default_factory=dict)
     plugin_keys: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    rigs: tuple[Rig, ...] = ()
     files: Stamps = field(default_factory=dict)
 
     @cached_property
@@ -386,10 +423,7 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         shown = [entry for entry in self.objects if not entry.hidden]
         if not shown:
             return (-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)
-        transforms = np.array([entry.transform for entry in shown])
-        used = {number: place for place, number in enumerate(dict.fromkeys(entry.mesh for entry in shown))}
-        boxes = np.array([self.meshes[number].box for number in used], np.float64)
-        low, high = boxes[[used[entry.mesh] for entry in shown]].swapaxes(0, 1)
+        transforms, (low, high) = np.array([entry.transform for entry in shown]), boxes_of(self.meshes, shown)
         center = np.einsum("nij,nj->ni", transforms[:, :3, :3], (low + high) / 2) + transforms[:, :3, 3]
         extent = np.einsum("nij,nj->ni", np.abs(transforms[:, :3, :3]), (high - low) / 2)
         low, high = extremes(np.concatenate([center - extent, center + extent]))
@@ -421,6 +455,14 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
     def __repr__(self) -> str:
         counts = f"{len(self.objects)} objects, {len(self.lights)} lights, {len(self.cameras)} cameras"
         return f"<Scene {self.name}: {counts}>"
+
+
+def boxes_of(meshes: tuple[Mesh, ...], objects: Sequence[Object]) -> Matrix:
+    """Return the object-space boxes of objects, (2, n, 3)."""
+    used = {key: place for place, key in enumerate(dict.fromkeys((entry.mesh, entry.pose) for entry in objects))}
+    boxes = [meshes[mesh].box if pose is None else pose.box for mesh, pose in used]
+    found = np.array(boxes, np.float64).reshape(-1, 2, 3)
+    return found[[used[entry.mesh, entry.pose] for entry in objects]].reshape(-1, 2, 3).swapaxes(0, 1)
 
 
 def changed_objects(before: Scene, scene: Scene) -> list[int]:

@@ -7,7 +7,7 @@ Layouts are those of the GLSL structs in `shaders/include/` (std140: everything 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -74,6 +74,7 @@ class PackedScene(Struct, frozen=True, eq=False):
         mirrored: bool (n,), the transform turns the winding round (determinant below 0).
         centers, extents: float64 (n, 3), middles and half sides of world-space bounding boxes.
         slack: float64 (n, 1), metres that rounding may move an object's vertices by on the GPU.
+        vertex_orders: by animated mesh where each of its packed vertices is in the mesh.
     """
 
     positions: Floats
@@ -100,6 +101,7 @@ class PackedScene(Struct, frozen=True, eq=False):
     extents: Doubles
     slack: Doubles
     names: tuple[str, ...]
+    vertex_orders: Mapping[int, npt.NDArray[np.int64]] = {}
 
 
 def pack(scene: Scene) -> PackedScene:
@@ -121,6 +123,7 @@ def pack(scene: Scene) -> PackedScene:
         meshes=records,
         lights=pack_lights(scene.lights),
         environment=pack_environment(scene.environment),
+        vertex_orders={n: vertices[n] for n, mesh in enumerate(scene.meshes) if mesh.deform is not None},
         **columns,
     )
 
@@ -175,7 +178,7 @@ def _moved(packed: PackedScene, before: Scene, scene: Scene) -> dict[str, Any]:
     """What objects are packed to of which some have moved: their records are made anew, those of the others copied."""
     was, now = before.objects, scene.objects
     moved = changed_objects(before, scene)
-    free = {"transform": 0, "extra": 0}
+    free = {"transform": 0, "extra": 0, "pose": 0}
     if any(asdict(was[number]) | free != asdict(now[number]) | free for number in moved):
         return _placed(scene, packed.meshes)
     made = _placed(replace(scene, objects=tuple(now[number] for number in moved)), packed.meshes)
@@ -201,6 +204,9 @@ def _placed(scene: Scene, meshes: Records) -> dict[str, Any]:
     instances["rows"] = transforms[:, :3, :]
     instances["ids"] = np.stack([material, np.arange(len(objects), dtype=np.int32)], axis=1)
     low, high = meshes["low"][mesh].astype(np.float64), meshes["high"][mesh].astype(np.float64)
+    for number, entry in enumerate(objects):
+        if entry.pose is not None:
+            low[number], high[number] = entry.pose.box
     linear, place = transforms[:, :3, :3], transforms[:, :3, 3]
     sizes = np.einsum("nij,nj->ni", np.abs(linear), np.maximum(np.abs(low), np.abs(high))) + np.abs(place)
     return {

@@ -22,7 +22,7 @@ from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.facts import NO_EXTRA, Extra
 from rendergraph.keys import Key, MapOf, Validator, plain
 from rendergraph.keys.values import FILE
-from rendergraph.scene import scene_keys, scene_values
+from rendergraph.scene import animate, scene_keys, scene_values
 from rendergraph.scene.environments import SKIES, named
 from rendergraph.scene.geometry import rigid
 from rendergraph.scene.mesh_files import MESHES, read_mesh
@@ -41,6 +41,7 @@ from rendergraph.scene.model import (
 )
 from rendergraph.scene.reading import Reading
 from rendergraph.scene.repeat import Copies, copies, count_of, read_columns
+from rendergraph.scene.rig import Playback, Rig
 from rendergraph.scene.shapes import SHAPES, ShapePart, build
 
 _DEFAULT = Material("default", base_color=(0.8, 0.8, 0.8, 1.0))
@@ -63,11 +64,12 @@ def _by_place(problem: Problem) -> tuple[bool, str, int, int]:
 
 
 class _File(Struct):
-    """A mesh file already read, with the places of its meshes and materials in the scene."""
+    """A mesh file already read, with the places of its meshes, its materials and its rig in the scene."""
 
     scene: Scene
     first_mesh: int
     first_material: int
+    rig: int | None
 
 
 class _Reader:
@@ -84,7 +86,9 @@ class _Reader:
         self.placements: dict[str, Placement] = {}
         self.copies: dict[tuple[str, str], Copies] = {}
         self.shapes: dict[tuple[Any, ...], tuple[int, list[ShapePart]]] = {}
-        self.files: dict[Path, _File] = {}
+        self.files: dict[tuple[Path, Playback | None], _File] = {}
+        self.mesh_files: dict[Path, Scene] = {}
+        self.rigs: list[Rig] = []
         self.material_numbers: dict[str | None, int] = {}
         self.names: dict[str, tuple[str, ...]] = {}
         self.table, self.sections = scene_keys.SCENE, scene_keys.SECTIONS
@@ -120,6 +124,7 @@ class _Reader:
             placements=self.placements,
             copies=self.copies,
             plugin_keys=self.plugin_keys,
+            rigs=tuple(self.rigs),
         )
 
     def _add_plugin_keys(self, root: Value) -> None:
@@ -307,11 +312,15 @@ class _Reader:
         elif "file" in values:
             place = _value(entry, "file")
             with self._reading_file(place):
-                file = self._read_file(name, values["file"], place)
+                file = self._read_file(name, values["file"], entry)
                 overrides = self._overrides(_entries(entry, "overrides"), name, file.scene, materials)
                 self._check_count(entry, len(each) * len(file.scene.objects))
                 for copy, matrix, material in each:
                     self._file(copy, matrix, file, values | {"material": material}, overrides)
+                if file.rig is not None:
+                    before = self.rigs[file.rig].placements
+                    copied_to = tuple((copy, matrix) for copy, matrix, _ in each)
+                    self.rigs[file.rig] = replace(self.rigs[file.rig], placements=(*before, *copied_to))
 
     def _check_count(self, entry: Value, more: int) -> None:
         if len(self.objects) + more > self.reading.limits.objects:
@@ -375,31 +384,51 @@ class _Reader:
                     changes.get("hidden", part.hidden),
                     f"{name}/{part.node}",
                     Extra({**values.get("extra", NO_EXTRA), **changes["extra"]}) if "extra" in changes else NO_EXTRA,
+                    part.pose,
                 )
             )
-        for light in scene.lights:
-            local = scene_values.light_matrix(light)
+        for number, light in enumerate(scene.lights):
+            local = scene.placements[""].lights[number][1] if scene.rigs else scene_values.light_matrix(light)
             lights.append((len(self.lights), local))
             self.lights.append(scene_values.moved_light(replace(light, name=f"{name}/{light.name}"), world @ local))
-        for camera in scene.cameras.values():
+        for number, camera in enumerate(scene.cameras.values()):
             camera_name = f"{name}/{camera.name}"
-            cameras.append((camera_name, camera.transform))
+            cameras.append((camera_name, scene.placements[""].cameras[number][1] if scene.rigs else camera.transform))
             self.cameras[camera_name] = replace(camera, name=camera_name, transform=rigid(world @ camera.transform))
         self.placements[name] = Placement(tuple(objects), tuple(lights), tuple(cameras))
 
-    def _read_file(self, name: str, file: str, place: Value) -> _File:
-        path = self.reading.resolve(file, line=place.line)
-        if path not in self.files:
+    def _read_file(self, name: str, file: str, entry: Value) -> _File:
+        path = self.reading.resolve(file, line=_value(entry, "file").line)
+        if path not in self.mesh_files:
             if path.suffix.lower() in MESHES:
                 self.reading.check_file(path, "file")
             inner = Reading(path, self.reading.check_path, self.reading.limits, self.reading.extensions)
             unknown = Problem("RG303", f"'{shown(file)}' is not a mesh file; a mesh ends in")
-            scene = read_mesh(path, inner, unknown)
+            self.mesh_files[path] = read_mesh(path, inner, unknown)
             self.reading.add_warnings(inner.warnings)
-            self.files[path] = _File(scene, len(self.meshes), len(self.materials))
+        scene = self.mesh_files[path]
+        playback = self._playback(name, entry, scene)
+        if (path, playback) not in self.files:
+            scene = animate.play(scene, playback) if scene.rigs else scene
+            rig = len(self.rigs) if scene.rigs else None
+            self.files[path, playback] = _File(scene, len(self.meshes), len(self.materials), rig)
+            self.rigs += [replace(each, placements=()) for each in scene.rigs]
             self.meshes += scene.meshes
             self.materials += [replace(material, name=f"{name}/{material.name}") for material in scene.materials]
-        return self.files[path]
+        return self.files[path, playback]
+
+    def _playback(self, name: str, entry: Value, scene: Scene) -> Playback | None:
+        """The clip that an object plays, None at rest."""
+        if (place := entry.get("animation")) is None or place.data is None:
+            return None
+        clips = scene.rigs[0].clips if scene.rigs else {}
+        values = plain(place, scene_keys.ANIMATION)
+        if not clips or values.get("clip", next(iter(clips))) not in clips:
+            what = f"no clip '{shown(values['clip'])}'" if "clip" in values else "no clips"
+            text = f"object '{shown(name)}': its file has {what}{suggestion(values.get('clip', ''), clips)}"
+            self.validator.report(place.get("clip") or place, "RG322", text)
+            return None
+        return Playback(**values)
 
     def _overrides(
         self, entries: Mapping[str, Value], name: str, scene: Scene, materials: Sequence[str]

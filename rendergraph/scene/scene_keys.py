@@ -76,6 +76,15 @@ _OVERRIDABLE = (
 )
 OVERRIDE = Table("override '{}'", _OVERRIDABLE)
 _OVERRIDES = Key("overrides", MapOf(OVERRIDE), "For a file: node name to material, hidden, casts_shadow.")
+ANIMATION = Table(
+    "animation",
+    (
+        Key("clip", NAME, "Name of one of the file's clips, by default its first; `explain FILE` lists them."),
+        Key("speed", number(), "Seconds of the clip for each second; less than 0 plays it backwards.", 1.0),
+        Key("start", number(), "Where in the clip frame 1 is.", 0.0, "s"),
+    ),
+)
+_PLAYS = Key("animation", ANIMATION, "For a file: plays a clip over and over; without it the file is at rest.")
 OBJECT = Table(
     "object '{}'",
     (
@@ -96,7 +105,7 @@ OBJECT = Table(
     ),
     {
         "shape": {name: shape.keys for name, shape in SHAPES.items()},
-        "file": (_OVERRIDES,),
+        "file": (_OVERRIDES, _PLAYS),
     },
 )
 
@@ -246,7 +255,7 @@ def with_plugins(extensions: Extensions, asked: Mapping[str, Iterable[str]] = {}
         added = {one.name: one for one in extensions.scene_keys(section)}
         for name in asked.get(section, ()):
             extensions.scene_key(section, name)
-        taken = NAMES[section] | (_SHAPE_KEYS | {"overrides"} if section == "objects" else set())
+        taken = NAMES[section] | (_SHAPE_KEYS | {"overrides", "animation"} if section == "objects" else set())
         if wrong := next((one for one in added.values() if one.name in taken), None):
             text = f"plugin '{wrong.plugin}': scene_keys['{section}'] has '{wrong.name}', a key of rendergraph's own"
             raise InputError(Problem("RG495", text, Place(shown_file(wrong.file))))
@@ -254,7 +263,8 @@ def with_plugins(extensions: Extensions, asked: Mapping[str, Iterable[str]] = {}
         found[section] = replace(found[section], keys=(*found[section].keys, *keys))
         if keys and section == "objects":
             overrides = replace(_OVERRIDES, type=MapOf(replace(OVERRIDE, keys=(*OVERRIDE.keys, *keys))))
-            found[section] = replace(found[section], alternatives={**OBJECT.alternatives, "file": (overrides,)})
+            alternatives = {**OBJECT.alternatives, "file": (overrides, _PLAYS)}
+            found[section] = replace(found[section], alternatives=alternatives)
     return found
 
 

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
 
-from rendergraph.scene.bvh import LEAF, Tree, build, depth_limit, triangle_boxes
+from rendergraph.scene.bvh import LEAF, Tree, build, depth_limit, refit, triangle_boxes
 from rendergraph.scene.model import Floats, Matrix, Scene
 from rendergraph.scene.pack import PackedScene
 
@@ -82,6 +82,8 @@ def mesh_trees(scene: Scene, packed: PackedScene) -> MeshTrees:
         for number, tree in zip(missing, built, strict=True):
             meshes[number].__dict__["tree"] = tree
     trees: list[Tree] = [mesh.__dict__["tree"] for mesh in meshes]
+    for number in packed.vertex_orders:  # animated meshes may be in another pose by now
+        trees[number] = refit(trees[number], triangle_boxes(*shapes[number]))
     at, first = first_rows(len(scene.objects)), 0
     parts, grids, roots = [np.zeros((0, 4), np.int32)], np.ones((len(trees), 2, 3), np.float32), []
     for number, tree in enumerate(trees):

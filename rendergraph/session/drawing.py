@@ -99,7 +99,7 @@ class Drawing(Struct, eq=False, dict=True):
                 still is None or self._held is None or self._held[0] != moment
             ):  # else nothing has moved, nor may seem to
                 self._held = moment, animate.at(scene, time)
-                self.scene.update(self._held[1])
+                self.executable.fresh |= self.scene.update(self._held[1])
             scene = self._held[1]
         if not self.runner.drawn:
             self.scene.advance()  # the first frame has no motion

@@ -5,12 +5,30 @@ layout(std430) readonly buffer scene_previous_block {
     float scene_previous[];  // 14 for each instance: the three rows of its matrix, and two that are not used
 };
 
+#ifdef SCENE_POSED
+layout(std430) readonly buffer scene_previous_position_block {
+    float scene_previous_positions[];  // object-space positions of the vertices in the frame before, 3 each
+};
+#endif
+
+// Object-space position of a vertex in the frame before, in metres.
+vec3 scene_previous_vertex_position(int vertex) {
+#ifdef SCENE_POSED
+    int at = 3 * vertex;
+    return vec3(scene_previous_positions[at], scene_previous_positions[at + 1], scene_previous_positions[at + 2]);
+#else
+    return scene_vertex_position(vertex);
+#endif
+}
+
 // World-space position in the frame before of a point of a triangle.
 vec3 scene_previous_position(int instance, int triangle, vec2 barycentrics) {
     ivec3 v = scene_triangle(instance, triangle);
     vec3 w = scene_weights(barycentrics);
-    mat3 corners =
-        mat3(scene_vertex_position(v.x), scene_vertex_position(v.y), scene_vertex_position(v.z));
+    mat3 corners = mat3(
+        scene_previous_vertex_position(v.x),
+        scene_previous_vertex_position(v.y),
+        scene_previous_vertex_position(v.z));
     vec4 point = vec4(corners * w, 1.0);
     vec3 previous;
     for (int row = 0; row < 3; ++row) {

@@ -10,6 +10,9 @@ in vec4 in_object2;
 in vec4 in_previous0;  // the same rows in the previous frame
 in vec4 in_previous1;
 in vec4 in_previous2;
+#ifdef SCENE_POSED
+in vec3 in_previous_position;  // object space, in the previous frame
+#endif
 centroid out vec4 v_clip_position;
 centroid out vec4 v_previous_clip_position;
 #endif
@@ -52,6 +55,15 @@ vec4 world_to_clip(vec3 position) {
     return PASS_VIEW.view_projection * vec4(position, 1.0);
 }
 
+// Object-space position of the vertex in the previous frame: another one than now where skins or morph targets move it.
+vec3 previous_vertex_position() {
+#if defined(WRITES_VELOCITY) && defined(SCENE_POSED)
+    return in_previous_position;
+#else
+    return in_position;
+#endif
+}
+
 // World-space position in the previous frame of a point `p` of the object; in a pass without velocity, in this frame.
 vec3 previous_object_to_world(vec3 p) {
 #ifdef WRITES_VELOCITY
@@ -73,5 +85,5 @@ void write_velocity_varyings(vec3 position, vec3 previous_position) {
 
 // The same of a vertex that moves with its object alone.
 void write_velocity_varyings() {
-    write_velocity_varyings(object_to_world(in_position), previous_object_to_world(in_position));
+    write_velocity_varyings(object_to_world(in_position), previous_object_to_world(previous_vertex_position()));
 }

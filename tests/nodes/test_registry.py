@@ -123,7 +123,8 @@ def test_no_shader_is_an_orphan() -> None:
             for origin in Includes(SHADERS / "include").expand(shader, root=shader.parent).origins
             if origin.file is not None
         }
-    spare = {SHADERS / "include" / name for name in ("frame.glsl", "view.glsl", "fullscreen.vert")}
+    others = ("frame.glsl", "view.glsl", "fullscreen.vert", "previous_scene.glsl", "pose.comp")
+    spare = {SHADERS / "include" / name for name in others}
     files = {path.resolve() for path in SHADERS.rglob("*") if path.suffix in STAGES | {".glsl"}}
     assert files - used - {path.resolve() for path in spare} == set()
 

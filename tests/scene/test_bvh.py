@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from rendergraph.scene.bvh import LEAF, Tree, build, depth_limit, triangle_boxes
+from rendergraph.scene.bvh import LEAF, Tree, build, depth_limit, refit, triangle_boxes
 from rendergraph.scene.tree_data import _grid, _node_rows
 
 Mesh = tuple[npt.NDArray[np.float32], npt.NDArray[np.uint32]]
@@ -107,6 +107,26 @@ def test_objects_are_alone_in_their_leaves() -> None:
     (tree,) = build(triangle_boxes(*mesh), [500], 1)
     check(tree, mesh)
     assert len(tree.children) == 499
+
+
+def test_a_refitted_tree_has_the_boxes_of_what_has_moved() -> None:
+    """Every box is that of the triangles below it, where they are now; one that has not moved keeps its boxes."""
+    positions, triangles = sphere(12)
+    (tree,) = build(triangle_boxes(positions, triangles), [len(triangles)])
+    np.testing.assert_array_equal(refit(tree, triangle_boxes(positions, triangles)).boxes, tree.boxes)
+    moved = (positions + np.random.default_rng(1).normal(0, 0.3, positions.shape)).astype(np.float32)
+    found = refit(tree, triangle_boxes(moved, triangles))
+
+    def below(reference: int) -> list[int]:
+        if reference >= 0:
+            return [one for child in tree.children[reference] for one in below(int(child))]
+        first, more = divmod(-1 - reference, LEAF)
+        return tree.order[first : first + more + 1].tolist()
+
+    for node, children in enumerate(tree.children):
+        for side, child in enumerate(children):
+            corners = moved[triangles[below(int(child))]].reshape(-1, 3)
+            np.testing.assert_array_equal(found.boxes[node, side], [*corners.min(axis=0), *corners.max(axis=0)])
 
 
 def test_boxes_are_rounded_outwards() -> None:

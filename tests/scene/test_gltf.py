@@ -311,11 +311,6 @@ def test_optional_extension_warns_once_and_required_one_stops(tmp_path: Path) ->
     assert error.value.exit_code == 3
 
 
-def test_skins_and_animations_warn(tmp_path: Path) -> None:
-    scene = read(tmp_path, gltf(skins=[{"joints": [0]}], animations=[{}]))
-    assert len(scene.warnings) == 2
-
-
 def glb(top: dict[str, Any], binary: bytes = b"", extra: bytes = b"") -> bytes:
     text = json.dumps(top).encode()
     text += b" " * (-len(text) % 4)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from msgspec.structs import replace
 
 from rendergraph.errors import InputError
 from rendergraph.projection import unit
@@ -12,6 +13,7 @@ from rendergraph.scene.gltf.buffers import Buffers
 from rendergraph.scene.gltf.schema import Accessor, Primitive
 from rendergraph.scene.model import FARTHEST, Floats, Mesh, extremes
 from rendergraph.scene.reading import Reading, UniqueNames
+from rendergraph.scene.rig import Deform
 
 _FLOAT = (5126,)
 _SMALL = (5126, 5121, 5123)
@@ -19,6 +21,7 @@ _SIGNED = (5126, 5120, 5122)
 _QUANTIZED = (5126, 5120, 5121, 5122, 5123)
 _UNSIGNED = (5121, 5123, 5125)
 _READ = ("POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "TEXCOORD_1", "COLOR_0")
+_TARGETS = {"POSITION": "positions", "NORMAL": "normals", "TANGENT": "tangents"}
 _MODES = ("points", "lines", "line loops", "line strips", "triangles", "triangle strips", "triangle fans")
 
 
@@ -31,15 +34,18 @@ class Primitives:
         self._mesh_of: dict[tuple[object, ...], int | None] = {}
         self._bytes = 0
         self.meshes: list[Mesh] = []
+        self.places: list[str] = []
 
     def mesh(self, primitive: Primitive, name: str, where: str) -> int | None:
         """Return the index of the primitive's mesh in `meshes`; None for points, lines and without positions."""
-        key = (tuple(sorted(primitive.attributes.items())), primitive.indices, primitive.mode)
+        accessors = tuple(tuple(sorted(part.items())) for part in (primitive.attributes, *primitive.targets))
+        key = (accessors, primitive.indices, primitive.mode)
         if key not in self._mesh_of:
             mesh = self._build(primitive, name, where)
             self._mesh_of[key] = None if mesh is None else len(self.meshes)
             if mesh is not None:
                 self.meshes.append(mesh)
+                self.places.append(where)
         return self._mesh_of[key]
 
     def _build(self, primitive: Primitive, name: str, where: str) -> Mesh | None:
@@ -69,7 +75,19 @@ class Primitives:
             self._reading.warn("RG332", "empty", f"{where}: a primitive without any triangle of area is left out")
             return None
         self._check_bounds(attributes["POSITION"])
-        return self._assemble(where, attributes, triangles, self._names.unique(name, "mesh"))
+        mesh = self._assemble(where, attributes, triangles, self._names.unique(name, "mesh"))
+        deform = self._deform(where, primitive, mesh)
+        if "NORMAL" in attributes:
+            return mesh if deform is None else replace(mesh, deform=deform)
+        # glTF: without normals the client computes flat ones and ignores tangents, those of targets as well.
+        self._add_bytes(where, triangles.size * 64)
+        made = flat(mesh)
+        if deform is None:
+            return made
+        found, still = deform.at(triangles.reshape(-1)), made.normals
+        bent = [flat(replace(mesh, positions=mesh.positions + d)).normals - still for d in deform.targets["positions"]]
+        targets = {"positions": found.targets["positions"], **({"normals": np.stack(bent)} if bent else {})}
+        return replace(made, deform=replace(found, targets=targets))
 
     def _error(self, text: str) -> InputError:
         return self._reading.error("RG304", text)
@@ -83,9 +101,8 @@ class Primitives:
             raise self._reading.error("RG306", f"{where}: a vertex lies beyond {FARTHEST:g} m")
         if colors is not None:
             colors = self._clamped_colors(where, colors)
-        if normals is None:  # glTF: without normals the client computes flat ones and ignores tangents
-            self._add_bytes(where, triangles.size * 64)
-            return flat(Mesh(name, positions, triangles, positions, None, uv0, uv1, colors))
+        if normals is None:
+            return Mesh(name, positions, triangles, positions, None, uv0, uv1, colors)
         filled, missing = filled_normals(positions, triangles, normals.astype(np.float64))
         if missing:
             text = f"{where}: {missing} normals of length zero are computed from faces"
@@ -94,6 +111,58 @@ class Primitives:
             hand = np.where(tangents[:, 3:] < 0, -1.0, 1.0)
             tangents = np.concatenate([unit(tangents[:, :3]), hand], axis=1).astype(np.float32)
         return Mesh(name, positions, triangles, filled, tangents, uv0, uv1, colors)
+
+    def _deform(self, where: str, primitive: Primitive, mesh: Mesh) -> Deform | None:
+        """How skins and morph targets move the mesh of a primitive."""
+        attributes, count = primitive.attributes, len(mesh.positions)
+        sets = [n for n in range(len(attributes)) if f"JOINTS_{n}" in attributes or f"WEIGHTS_{n}" in attributes]
+        if not sets and not primitive.targets:
+            return None
+        self._add_bytes(where, count * (36 * len(primitive.targets) + 32 * len(sets)))
+        joints, weights = [np.zeros((count, 0), np.int32)], [np.zeros((count, 0))]
+        for number in sets:
+            names = f"JOINTS_{number}", f"WEIGHTS_{number}"
+            if missing := [name for name in names if name not in attributes]:
+                raise self._error(f"{where} has no {missing[0]}, which belongs to its other joints and weights")
+            uses = zip(names, ((5121, 5123), _SMALL), strict=True)
+            for name, components in uses:
+                is_weight = name == names[1]
+                self._buffers.check_use(
+                    attributes[name], f"{where}.{name}", ("VEC4",), components, normalized=is_weight
+                )
+            joints.append(self._buffers.array(attributes[names[0]]).astype(np.int32))
+            weights.append(self._buffers.floats(attributes[names[1]]).astype(np.float64))
+        share, joint = np.concatenate(weights, axis=1), np.concatenate(joints, axis=1)
+        total = share.sum(axis=1, keepdims=True)
+        if sets and ((share < 0).any() or not total.all()):
+            vertex = int(np.argmax((share < 0).any(axis=1) | (total[:, 0] == 0)))
+            what = f"sum to {total[vertex, 0]:g}" if total[vertex, 0] <= 0 else "are partly negative"
+            raise self._error(f"{where}.WEIGHTS_0: the weights of vertex {vertex} {what}")
+        joint[share == 0] = 0
+        return Deform(joint, (share / total).astype(np.float32), self._targets(where, primitive, mesh))
+
+    def _targets(self, where: str, primitive: Primitive, mesh: Mesh) -> dict[str, Floats]:
+        """The displacements of the morph targets, float32 (t, n, 3) by stream."""
+        shape = (len(primitive.targets), len(mesh.positions), 3)
+        found: dict[str, Floats] = {"positions": np.zeros(shape, np.float32)}
+        for number, target in enumerate(primitive.targets):
+            for key, index in target.items():
+                use = f"{where}.targets[{number}].{key}"
+                accessor = self._buffers.accessor(index, use)
+                stream = _TARGETS.get(key)
+                if stream is None:
+                    self._reading.warn("RG333", f"target {key}", f"{use}: morph targets of '{key}' are left out")
+                    continue
+                components = _FLOAT if not self._quantized else _QUANTIZED if stream == "positions" else _SIGNED
+                self._buffers.check_use(index, use, ("VEC3",), components)
+                if accessor.count != shape[1]:
+                    raise self._error(f"{use} has {accessor.count} values, but the primitive {shape[1]} vertices")
+                values = self._buffers.floats(index)
+                if np.abs(values).max() > FARTHEST:
+                    raise self._reading.error("RG306", f"{use}: a vertex moves farther than {FARTHEST:g} m")
+                if getattr(mesh, stream) is not None:
+                    found.setdefault(stream, np.zeros(shape, np.float32))[number] = values
+        return found
 
     def _attribute(self, key: str, number: int, where: str) -> Accessor:
         """The accessor of an attribute, whose type must be one of those that the attribute may have."""

@@ -1,11 +1,11 @@
 """Nodes, cameras and lights of a glTF file as a scene.
 
-Skins, morph targets and animations are left out with a warning: the mesh is drawn in its rest pose. So are extensions
-that are not read; one that the file requires is an error.
+Extensions that are not read are left out with a warning; one that the file requires is an error.
 """
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,14 +17,16 @@ from msgspec.structs import replace
 from rendergraph.document import shown
 from rendergraph.errors import InputError
 from rendergraph.projection import unit
-from rendergraph.scene.geometry import placement, quaternion_matrix, rigid, vec3
+from rendergraph.scene.geometry import rigid, vec3
 from rendergraph.scene.gltf import schema
 from rendergraph.scene.gltf.buffers import Buffers, split_glb
 from rendergraph.scene.gltf.materials import Materials
+from rendergraph.scene.gltf.motion import read_clips, read_skins
 from rendergraph.scene.gltf.primitives import Primitives
 from rendergraph.scene.gltf.schema import Gltf, check_index
-from rendergraph.scene.model import FARTHEST, Camera, Light, Material, Matrix, Object, Scene
+from rendergraph.scene.model import FARTHEST, Camera, Light, Matrix, Object, Placement, Scene
 from rendergraph.scene.reading import Reading, UniqueNames
+from rendergraph.scene.rig import Part, Rig, placements
 
 _READ = frozenset(
     {
@@ -50,13 +52,18 @@ def read_gltf(path: Path, reading: Reading) -> Scene:
     return _Reader(schema.decode(data, reading), binary, path, reading).scene()
 
 
+def used_extensions(data: bytes) -> list[str]:
+    """Return the names of the extensions that a valid file uses."""
+    text = data[20 : 20 + int.from_bytes(data[12:16], "little")] if data[:4] == b"glTF" else data
+    return [str(name) for name in json.loads(text).get("extensionsUsed", ())]
+
+
 class _Node(Struct):
-    """A node with a unique name; `instances` are transforms inside it."""
+    """A node with a unique name; `instances` are transforms inside it, (n, 4, 4)."""
 
     json: schema.Node
     name: str
-    local: Matrix
-    instances: list[Matrix] | None
+    instances: Matrix
 
 
 class _Reader:
@@ -80,6 +87,9 @@ class _Reader:
             raise reading.over(f"has {len(gltf.nodes):,} nodes", "objects")
         names = UniqueNames()
         self._nodes = [self._node(node, number, names) for number, node in enumerate(gltf.nodes)]
+        self._posed = [mesh if mesh.deform is None else replace(mesh, deform=None) for mesh in self._primitives.meshes]
+        self._slots: dict[int, dict[tuple[int, int] | None, int]] = {}
+        self._placed_materials = list(self._materials.materials)
 
     def _error(self, text: str) -> InputError:
         return self._reading.error("RG304", text)
@@ -92,9 +102,6 @@ class _Reader:
         for name in gltf.extensions_used:
             if name not in _READ:
                 self._reading.warn("RG333", f"extension {name}", f"the extension '{shown(name)}' is left out")
-        for what, entries in (("animations", gltf.animations), ("skins", gltf.skins)):
-            if entries:
-                self._reading.warn("RG333", what, f"{what} are left out; the rest pose is drawn")
 
     def _mesh(self, mesh: schema.Mesh, number: int) -> list[tuple[int, int]]:
         """Mesh and material index of each triangle primitive; material -1 is the default one."""
@@ -102,10 +109,8 @@ class _Reader:
         for k, primitive in enumerate(mesh.primitives):
             where = f"meshes[{number}].primitives[{k}]"
             check_index(self._reading, primitive.material, self._gltf.materials, f"{where}.material", "materials")
-            for target in primitive.targets:
-                for key, index in target.items():
-                    self._buffers.accessor(index, f"{where}.targets.{key}")
-                self._reading.warn("RG333", "morph targets", "morph targets are left out; the rest pose is drawn")
+            if len(primitive.targets) != len(mesh.primitives[0].targets):
+                raise self._error(f"{where}.targets: the primitives of a mesh must have the same number of them")
             index_of_mesh = self._primitives.mesh(primitive, mesh.name or f"mesh_{number}", where)
             if index_of_mesh is not None:
                 result.append((index_of_mesh, primitive.material))
@@ -149,32 +154,23 @@ class _Reader:
             name = self._lights[light].name
         if not name and node.camera >= 0:
             name = self._cameras[node.camera].name
-        return _Node(node, names.unique(name, f"node_{number}"), self._local(node, where), self._instances(node, where))
+        self._check_transform(node, where)
+        return _Node(node, names.unique(name, f"node_{number}"), self._instances(node, where))
 
     def _check_nodes(self, indices: Sequence[int], where: str) -> None:
         check_index(self._reading, max(indices, default=-1), self._gltf.nodes, where, "nodes")
 
-    def _local(self, node: schema.Node, where: str) -> Matrix:
-        is_placed = any(part is not None for part in (node.translation, node.rotation, node.scale))
-        if node.matrix:
-            if is_placed:
-                raise self._error(f"{where} has both 'matrix' and translation, rotation or scale")
-            matrix = np.array(node.matrix).reshape(4, 4).T.copy()
-            if not np.allclose(matrix[3], (0, 0, 0, 1), atol=1e-5):
-                raise self._error(f"{where}: 'matrix' is not affine: its last row is not 0 0 0 1")
-            matrix[3] = (0, 0, 0, 1)
-            return matrix
-        if not is_placed:
-            return _IDENTITY
-        try:
-            rotation = quaternion_matrix(*(node.rotation or (0.0, 0.0, 0.0, 1.0)))
-        except ValueError:
-            raise self._error(f"{where}: 'rotation' is a quaternion of length zero") from None
-        return placement(node.translation or (0.0, 0.0, 0.0), rotation, node.scale or (1.0, 1.0, 1.0))
+    def _check_transform(self, node: schema.Node, where: str) -> None:
+        if node.matrix and any(part is not None for part in (node.translation, node.rotation, node.scale)):
+            raise self._error(f"{where} has both 'matrix' and translation, rotation or scale")
+        if node.matrix and not np.allclose(node.matrix[3::4], (0, 0, 0, 1), atol=1e-5):
+            raise self._error(f"{where}: 'matrix' is not affine: its last row is not 0 0 0 1")
+        if node.rotation is not None and not any(node.rotation):
+            raise self._error(f"{where}: 'rotation' is a quaternion of length zero")
 
-    def _instances(self, node: schema.Node, where: str) -> list[Matrix] | None:
+    def _instances(self, node: schema.Node, where: str) -> Matrix:
         if node.extensions.instancing is None:
-            return None
+            return _IDENTITY[None]
         attributes, arrays = node.extensions.instancing.attributes, {}
         for key, index in attributes.items():
             use = f"{where}.{key}"
@@ -194,72 +190,134 @@ class _Reader:
         scales = values.get("SCALE", np.ones((count, 3)))
         if (~rotations.any(axis=1)).any():
             raise self._error(f"{where}: ROTATION has a quaternion of length zero")
-        rows = zip(translations, rotations, scales, strict=True)
-        return [placement(at, quaternion_matrix(*turn), scale) for at, turn, scale in rows]
+        return placements(translations, rotations, scales)
 
     def scene(self) -> Scene:
-        roots = self._roots()
-        count = sum(
-            len(self._meshes[node.json.mesh]) * (1 if node.instances is None else len(node.instances))
-            for node in self._nodes
-            if node.json.mesh >= 0
-        )
+        roots, parents = self._roots()
+        nodes = self._nodes
+        count = sum(len(self._meshes[node.json.mesh]) * len(node.instances) for node in nodes if node.json.mesh >= 0)
         if count > self._reading.limits.objects:
             raise self._reading.over(f"its nodes place {count:,} objects", "objects")
-        objects: list[Object] = []
-        lights: list[Light] = []
-        cameras: dict[str, Camera] = {}
-        materials = list(self._materials.materials)
-        names = UniqueNames()
-        stack = [(index, _IDENTITY) for index in reversed(roots)]
+        rig = self._rig(parents)
+        worlds, _ = rig.at(0.0)
+        is_near = np.abs(worlds).max(axis=(1, 2), initial=0) <= FARTHEST
+        names, objects, parts = UniqueNames(), list[Object](), list[Part]()
+        lights: list[tuple[Light, int]] = []
+        cameras: dict[str, tuple[Camera, int]] = {}
+        stack = roots[::-1]
         while stack:
-            index, parent = stack.pop()
-            node = self._nodes[index]
-            world = parent
-            if node.local is not _IDENTITY:
-                with np.errstate(over="ignore", invalid="ignore"):
-                    world = parent @ node.local
-                    is_near = (np.abs(world) <= FARTHEST).all()
-                if not is_near:
-                    text = f"nodes[{index}]: its world transform is not finite, or beyond {FARTHEST:g} m"
-                    raise self._reading.error("RG306", text)
-            stack += [(child, world) for child in reversed(node.json.children)]
+            index = stack.pop()
+            node, world = nodes[index], worlds[index]
+            if not is_near[index]:
+                text = f"nodes[{index}]: its world transform is not finite, or beyond {FARTHEST:g} m"
+                raise self._reading.error("RG306", text)
+            stack += node.json.children[::-1]
             if node.json.mesh >= 0:
-                self._place(node, world, objects, names, materials)
+                placed, followed = self._place(index, world, rig, names)
+                objects += placed
+                parts += followed
             if (light := node.json.extensions.light.light) >= 0:
                 axis, position = unit(-world[:3, 2]), vec3(world[:3, 3])
                 direction = vec3(axis) if axis.any() else (0.0, 0.0, -1.0)
-                lights.append(replace(self._lights[light], name=node.name, position=position, direction=direction))
+                moved = replace(self._lights[light], name=node.name, position=position, direction=direction)
+                lights.append((moved, index))
             if node.json.camera >= 0:
                 camera = self._cameras[node.json.camera]
-                cameras[node.name] = replace(camera, name=node.name, transform=rigid(world))
-        return Scene(
+                cameras[node.name] = replace(camera, name=node.name, transform=rigid(world)), index
+        scene = Scene(
             self._path.stem,
             self._path,
             tuple(objects),
-            tuple(self._primitives.meshes),
-            tuple(materials),
-            tuple(lights),
-            cameras,
+            tuple(self._posed),
+            tuple(self._placed_materials),
+            tuple(light for light, _ in lights),
+            {name: camera for name, (camera, _) in cameras.items()},
+        )
+        if not rig.clips and all(mesh.deform is None for mesh in scene.meshes):
+            return scene
+        placement = Placement(
+            tuple((number, placed.transform) for number, placed in enumerate(objects)),
+            tuple((number, worlds[node]) for number, (_, node) in enumerate(lights)),
+            tuple((name, worlds[node]) for name, (_, node) in cameras.items()),
+        )
+        hung = tuple(node for _, node in lights), tuple(node for _, node in cameras.values())
+        rig = replace(rig, objects=tuple(parts), lights=hung[0], cameras=hung[1])
+        return replace(scene, rigs=(rig,), placements={"": placement})
+
+    def _rig(self, parents: Sequence[int]) -> Rig:
+        """All nodes at rest, with what can move them."""
+        nodes = self._gltf.nodes
+        counts, weights = [0] * len(nodes), {}
+        for number, node in enumerate(nodes):
+            if node.mesh < 0:
+                continue
+            mesh = self._gltf.meshes[node.mesh]
+            counts[number] = len(mesh.primitives[0].targets)
+            given = node.weights or mesh.weights or [0.0] * counts[number]
+            if len(given) != counts[number]:
+                where = f"nodes[{number}]" if node.weights else f"meshes[{node.mesh}]"
+                raise self._error(f"{where}.weights are {len(given)}, but the mesh has {counts[number]} morph targets")
+            if given:
+                weights[number] = np.array(given, np.float64)
+        return Rig(
+            np.array(parents, np.int32),
+            np.array([node.translation or (0, 0, 0) for node in nodes], np.float64).reshape(-1, 3),
+            np.array([node.rotation or (0, 0, 0, 1) for node in nodes], np.float64).reshape(-1, 4),
+            np.array([node.scale or (1, 1, 1) for node in nodes], np.float64).reshape(-1, 3),
+            {n: np.reshape(node.matrix, (4, 4)).T for n, node in enumerate(nodes) if node.matrix},
+            weights,
+            read_skins(self._gltf, self._buffers, self._reading),
+            read_clips(self._gltf, self._buffers, self._reading, counts),
         )
 
-    def _place(
-        self, node: _Node, world: Matrix, objects: list[Object], names: UniqueNames, materials: list[Material]
-    ) -> None:
-        """Add the objects of a node, and the default material if one of them is the first to use it."""
-        default = len(self._materials.materials)
-        transforms = [world] if node.instances is None else [world @ instance for instance in node.instances]
-        for number, transform in enumerate(transforms):
-            instance = node.name if node.instances is None else f"{node.name}[{number}]"
+    def _place(self, index: int, world: Matrix, rig: Rig, names: UniqueNames) -> tuple[list[Object], list[Part]]:
+        """The objects of a node; adds the default material if one of them is the first to use it."""
+        node, default = self._nodes[index], len(self._materials.materials)
+        is_instanced = node.json.extensions.instancing is not None
+        objects, parts = [], []
+        for number, local in enumerate(node.instances):
+            instance = f"{node.name}[{number}]" if is_instanced else node.name
             for k, (mesh, material) in enumerate(self._meshes[node.json.mesh]):
                 if material < 0:
                     material = default
-                    materials[default:] = [self._materials.default]
+                    self._placed_materials[default:] = [self._materials.default]
                 name = names.unique(instance if k == 0 else f"{instance}#{k}", "object")
-                self._reading.warn_unmapped(name, materials[material], self._primitives.meshes[mesh])
-                objects.append(Object(name, mesh, material, transform, not node.name.endswith("NS"), node=node.name))
+                mesh = self._own_mesh(mesh, index, rig)
+                deform = self._posed[mesh].deform
+                skin = node.json.skin if deform is not None and deform.joints.shape[1] else -1
+                self._reading.warn_unmapped(name, self._placed_materials[material], self._posed[mesh])
+                transform, shadow = (world @ local if skin < 0 else local), not node.name.endswith("NS")
+                objects.append(Object(name, mesh, material, transform, shadow, node=node.name))
+                parts.append(Part(index, local, skin))
+        return objects, parts
 
-    def _roots(self) -> list[int]:
+    def _own_mesh(self, mesh: int, index: int, rig: Rig) -> int:
+        """The mesh of a node: what its skin or its weights move needs vertices of its own."""
+        deform, skin = self._primitives.meshes[mesh].deform, self._nodes[index].json.skin
+        key: tuple[int, int] | None = None
+        if skin >= 0:
+            where, joints = self._primitives.places[mesh], len(rig.skins[skin].joints)
+            if deform is None or not deform.joints.shape[1]:
+                raise self._error(f"nodes[{index}] has a skin, but {where} has no JOINTS_0 and WEIGHTS_0")
+            if (highest := int(deform.joints.max())) >= joints:
+                raise self._error(f"{where}: joint {highest} is out of range; skins[{skin}] has {joints} joints")
+        elif deform is not None:
+            deform = replace(deform, joints=deform.joints[:, :0], weights=deform.weights[:, :0])
+        has_targets = deform is not None and len(deform.targets["positions"]) > 0
+        if skin >= 0 or has_targets:
+            key = skin, index if has_targets else -1
+        slots = self._slots.setdefault(mesh, {})
+        if key not in slots:
+            made = replace(self._primitives.meshes[mesh], deform=deform if key else None)
+            slots[key] = len(self._posed) if slots else mesh
+            if slots[key] == mesh:
+                self._posed[mesh] = made
+            else:
+                self._posed.append(made)
+        return slots[key]
+
+    def _roots(self) -> tuple[list[int], list[int]]:
+        """The nodes that the scene begins with, and the parent of each node, -1 without."""
         parent: dict[int, int] = {}
         for index, node in enumerate(self._nodes):
             for child in node.json.children:
@@ -277,9 +335,9 @@ class _Reader:
             if len(set(scene)) != len(scene):
                 raise self._reading.error("RG309", f"scenes[{index}] names a node twice")
         check_index(self._reading, self._gltf.scene, scenes, "'scene'", "scenes")
-        if scenes:
-            return scenes[max(self._gltf.scene, 0)]
-        return [index for index in range(len(self._nodes)) if index not in parent]
+        parents = [parent.get(index, -1) for index in range(len(self._nodes))]
+        roots = [index for index, above in enumerate(parents) if above < 0]
+        return scenes[max(self._gltf.scene, 0)] if scenes else roots, parents
 
     def _check_cycles(self, parent: dict[int, int]) -> None:
         """Check that every node has an ancestor without a parent."""

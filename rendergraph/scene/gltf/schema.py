@@ -169,6 +169,35 @@ class Primitive(_Struct, frozen=True):
 class Mesh(_Struct, frozen=True):
     primitives: Annotated[list[Primitive], Meta(min_length=1)]
     name: str = ""
+    weights: list[float] = []
+
+
+class Skin(_Struct, frozen=True):
+    joints: Annotated[list[Index], Meta(min_length=1)]
+    inverse_bind_matrices: Index = -1
+    skeleton: Index = -1
+
+
+class ChannelTarget(_Struct, frozen=True):
+    path: str
+    node: Index = -1
+
+
+class Channel(_Struct, frozen=True):
+    sampler: Index
+    target: ChannelTarget
+
+
+class AnimationSampler(_Struct, frozen=True):
+    input: Index
+    output: Index
+    interpolation: Literal["LINEAR", "STEP", "CUBICSPLINE"] = "LINEAR"
+
+
+class Animation(_Struct, frozen=True):
+    name: str = ""
+    channels: list[Channel] = []
+    samplers: list[AnimationSampler] = []
 
 
 class Perspective(_Struct, frozen=True):
@@ -231,6 +260,7 @@ class Node(_Struct, frozen=True):
     translation: Vec3 | None = None
     rotation: Vec4 | None = None
     scale: Vec3 | None = None
+    weights: list[float] = []
     extensions: NodeExtensions = NodeExtensions()
 
 
@@ -258,8 +288,8 @@ class Gltf(_Struct, frozen=True):
     cameras: list[Camera] = []
     nodes: list[Node] = []
     scenes: list[Scene] = []
-    skins: list[dict[str, Any]] = []
-    animations: list[dict[str, Any]] = []
+    skins: list[Skin] = []
+    animations: list[Animation] = []
     extensions: FileExtensions = FileExtensions()
 
 

@@ -1,0 +1,146 @@
+"""Skinning and morphing: a compute shader moves the vertices of animated meshes whenever their pose has changed."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Any
+
+import moderngl
+import numpy as np
+from msgspec import Struct, field
+
+from rendergraph.errors import Problem, RenderError
+from rendergraph.gl.device import Device
+from rendergraph.program.text import VERSION
+from rendergraph.resources import folder
+from rendergraph.scene.model import Scene
+from rendergraph.scene.pack import PackedScene
+from rendergraph.scene.rig import Floats, Pose
+
+_TARGET_STREAMS = ("positions", "normals", "tangents")
+_MOST_GROUPS = 65535
+_ALL_BARRIERS = 0xFFFFFFFF
+
+
+class Posing(Struct, eq=False):
+    """The animated meshes of a scene.
+
+    Attributes:
+        streams: the buffers of positions, normals and, where the scene has some, tangents, which are written.
+        vertices: the same vertices as the scene's data, with the number of floats of each, once somebody reads it.
+        before: positions in the frame before, of all of the scene's vertices, once somebody reads them.
+        poses: what the buffers hold, by mesh.
+        stale: the meshes that have another pose than in the frame before.
+    """
+
+    device: Device
+    packed: PackedScene
+    streams: Mapping[str, moderngl.Buffer]
+    rest: moderngl.Buffer
+    state: moderngl.Buffer
+    uniforms: Mapping[int, Mapping[str, tuple[int, ...]]]
+    vertices: tuple[moderngl.Buffer, int] | None = None
+    before: moderngl.Buffer | None = None
+    poses: dict[int, Pose] = field(default_factory=dict)
+    stale: set[int] = field(default_factory=set)
+    _program: Any = None
+
+    @classmethod
+    def make(cls, device: Device, scene: Scene, packed: PackedScene, streams: Mapping[str, moderngl.Buffer]) -> Posing:
+        """Upload the meshes at rest, and pose them as the scene has them."""
+        parts: list[Floats] = []
+        uniforms: dict[int, dict[str, tuple[int, ...]]] = {}
+        begin = state = 0
+        poses = {placed.mesh: placed.pose for placed in scene.objects if placed.pose is not None}
+        for number, pose in poses.items():
+            record, deform = packed.meshes[number], scene.meshes[number].deform
+            assert deform is not None
+            deform = deform.at(packed.vertex_orders[number])
+            first, count = int(record["base_vertex"]), int(record["vertices"])
+            columns = [getattr(packed, name)[first : first + count] for name in _TARGET_STREAMS if name in streams]
+            columns += [deform.joints.astype(np.float32), deform.weights]
+            deltas = [deform.targets[name] for name in _TARGET_STREAMS if name in deform.targets]
+            columns.append(np.concatenate(deltas, axis=2).swapaxes(0, 1).reshape(count, -1))
+            table = np.concatenate(columns, axis=1)
+            joints, targets = len(pose.joints), len(pose.weights)
+            uniforms[number] = {
+                "mesh": (first, count, begin, state),
+                "sizes": (deform.joints.shape[1], joints, targets, table.shape[1]),
+                "displaced": ("normals" in deform.targets, "tangents" in deform.targets),
+            }
+            parts.append(table.reshape(-1))
+            begin, state = begin + table.size, state + 12 * joints + targets
+        if 4 * begin > device.limits["storage_block"]:
+            most = device.limits["storage_block"]
+            text = f"the scene's animated meshes take {4 * begin} bytes, a storage block of this device holds {most}"
+            raise RenderError(Problem("RG435", text))
+        rest, held = device.ctx.buffer(np.concatenate(parts).tobytes()), device.ctx.buffer(reserve=4 * max(state, 1))
+        made = cls(device, packed, streams, rest, held, uniforms)
+        made.update(poses)
+        return made
+
+    def update(self, poses: Mapping[int, Pose]) -> bool:
+        """Move the vertices of meshes whose pose is another than before; return whether there are some."""
+        changed = {number: pose for number, pose in poses.items() if not pose.is_like(self.poses.get(number))}
+        self.poses |= changed
+        self.stale |= changed.keys()
+        for number, pose in changed.items():
+            values = np.concatenate([pose.joints.reshape(-1), pose.weights]).astype(np.float32)
+            self.state.write(values.tobytes(), offset=4 * self.uniforms[number]["mesh"][3])
+        self._dispatch(changed)
+        return bool(changed)
+
+    def fill(self, vertices: moderngl.Buffer, width: int) -> None:
+        """From now on pose the vertices of the scene's data as well."""
+        self.vertices, self._program = (vertices, width), None
+        self._dispatch(self.poses)
+
+    def positions(self) -> Floats:
+        """Read back today's positions of all of the scene's vertices, float32 (v, 3)."""
+        return np.frombuffer(self.streams["positions"].read(), np.float32).reshape(-1, 3)
+
+    def previous(self) -> moderngl.Buffer:
+        """Positions in the frame before, kept from now on."""
+        if self.before is None:
+            self.before = self.device.ctx.buffer(reserve=self.streams["positions"].size)
+            self.device.ctx.copy_buffer(self.before, self.streams["positions"])
+        return self.before
+
+    def advance(self) -> bool:
+        """Keep the positions as those of the frame before; return whether somebody reads those that have changed."""
+        stale, self.stale = (self.stale if self.before is not None else set()), set()
+        for number in stale:
+            assert self.before is not None
+            first, count, *_ = self.uniforms[number]["mesh"]
+            self.device.ctx.copy_buffer(
+                self.before, self.streams["positions"], 12 * count, read_offset=12 * first, write_offset=12 * first
+            )
+        return bool(stale)
+
+    def _dispatch(self, meshes: Collection[int]) -> None:
+        if not meshes:
+            return
+        program = self._program = self._program or self._compiled()
+        buffers = [self.rest, self.state, *self.streams.values()]
+        for point, buffer in enumerate(buffers):
+            buffer.bind_to_storage_buffer(point)
+        if self.vertices is not None:
+            self.vertices[0].bind_to_storage_buffer(5)
+            program["vertex_width"] = self.vertices[1]
+        for number in meshes:
+            for name, value in self.uniforms[number].items():
+                program[name] = value
+            groups = -(-self.uniforms[number]["mesh"][1] // 64)
+            program.run(min(groups, _MOST_GROUPS), -(-groups // _MOST_GROUPS))
+        self.device.raw.glMemoryBarrier(_ALL_BARRIERS)
+
+    def _compiled(self) -> Any:
+        macros = {"TANGENTS": "tangents" in self.streams, "SCENE_DATA": self.vertices is not None}
+        defines = "".join(f"#define {name} 1\n" for name, yes in macros.items() if yes)
+        text = (folder("rendergraph.shaders") / "include" / "pose.comp").read_text(encoding="utf-8")
+        return self.device.ctx.compute_shader(f"{VERSION}\n{defines}{text}")
+
+    def release(self) -> None:
+        for each in (self.rest, self.state, self.before, self._program):
+            if each is not None:
+                each.release()

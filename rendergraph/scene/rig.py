@@ -1,0 +1,316 @@
+"""Skeletons, morph targets and the clips that move them: glTF 2.0 §3.11 and §3.7.2-§3.7.3, evaluated in float64."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import numpy.typing as npt
+from msgspec import Struct
+
+from rendergraph.projection import unit
+
+if TYPE_CHECKING:
+    from rendergraph.scene.model import Mesh, Scene
+
+Floats = npt.NDArray[np.float32]
+Doubles = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int32]
+Box = tuple[Doubles, Doubles]
+
+_BOX_SLACK = 1e-5
+"""Of the sizes of the terms that a posed vertex is summed from: more than single precision loses in them."""
+
+
+class Deform(Struct, frozen=True, eq=False):
+    """How the n vertices of a mesh follow joints and morph targets.
+
+    Attributes:
+        joints: int32 (n, k), the joints of each vertex, k = 0 without a skin.
+        weights: float32 (n, k), not negative, with a sum of 1.
+        targets: by stream (`positions`, `normals`, `tangents`) the displacements of t targets, float32 (t, n, 3).
+    """
+
+    joints: Ints
+    weights: Floats
+    targets: Mapping[str, Floats]
+
+    def at(self, vertices: npt.NDArray[np.integer]) -> Deform:
+        """Return the same for some of the vertices, in another order."""
+        targets = {name: deltas[:, vertices] for name, deltas in self.targets.items()}
+        return Deform(self.joints[vertices], self.weights[vertices], targets)
+
+
+class Pose(Struct, frozen=True, eq=False):
+    """What moves the vertices of one mesh at a moment; all objects of the mesh have the same.
+
+    Attributes:
+        joints: float64 (j, 3, 4), from the mesh to the object: the joint's transform times the inverse of its bind
+            pose; j = 0 without a skin.
+        weights: float64 (t,), of the morph targets.
+        box: least and greatest corner, which contain all posed vertices.
+    """
+
+    joints: Doubles
+    weights: Doubles
+    box: Box
+
+    def is_like(self, other: Pose | None) -> bool:
+        return other is not None and all(
+            map(np.array_equal, (self.joints, self.weights), (other.joints, other.weights))
+        )
+
+
+def pose_of(mesh: Mesh, joints: Doubles | None, weights: Doubles | None) -> Pose:
+    """Return a pose with its box. A vertex is a mean of where each joint would have it, so it lies in their hull."""
+    used, low, high = mesh.joint_boxes
+    center, extent = (low + high) / 2, (high - low) / 2
+    if weights is not None and len(weights):
+        least, most = mesh.target_boxes
+        center = center + weights @ ((least + most) / 2)
+        extent = extent + np.abs(weights) @ ((most - least) / 2)
+    size = np.abs(center) + extent
+    if joints is not None:
+        linear, offset = joints[used, :, :3], joints[used, :, 3]
+        center = np.einsum("jik,jk->ji", linear, center) + offset
+        extent = np.einsum("jik,jk->ji", np.abs(linear), extent)
+        size = np.einsum("jik,jk->ji", np.abs(linear), size) + np.abs(offset)
+    extent = extent + _BOX_SLACK * size
+    joints, weights = (np.zeros((0, 3, 4)) if joints is None else joints), (np.zeros(0) if weights is None else weights)
+    return Pose(joints, weights, ((center - extent).min(axis=0), (center + extent).max(axis=0)))
+
+
+def joint_boxes(mesh: Mesh) -> tuple[Ints, Doubles, Doubles]:
+    """Return the joints that move some vertex, (u,), and the box of what each of them moves, (u, 3) twice."""
+    assert mesh.deform is not None
+    positions, joints, weights = mesh.positions.astype(np.float64), mesh.deform.joints, mesh.deform.weights
+    if not joints.shape[1]:
+        return np.zeros(1, np.int32), positions.min(axis=0)[None], positions.max(axis=0)[None]
+    low = np.full((int(joints.max()) + 1, 3), np.inf)
+    high = -low
+    for joint, weight in zip(joints.T, weights.T, strict=True):
+        np.minimum.at(low, joint[weight > 0], positions[weight > 0])
+        np.maximum.at(high, joint[weight > 0], positions[weight > 0])
+    used = np.flatnonzero(low[:, 0] <= high[:, 0]).astype(np.int32)
+    return used, low[used], high[used]
+
+
+def posed(mesh: Mesh, pose: Pose) -> dict[str, Doubles]:
+    """Return positions, normals and, if it has some, tangents of a mesh in a pose, float64."""
+    deform = mesh.deform
+    assert deform is not None
+    found = {
+        name: stream.astype(np.float64) for name in ("positions", "normals", "tangents")
+        if (stream := getattr(mesh, name)) is not None
+    }  # fmt: skip
+    for name, deltas in deform.targets.items():
+        found[name][:, :3] += np.tensordot(pose.weights, deltas.astype(np.float64), 1)
+    if len(pose.joints):
+        blended = np.einsum("nk,nkij->nij", deform.weights.astype(np.float64), pose.joints[deform.joints])
+        linear = blended[:, :, :3]
+        found["positions"] = np.einsum("nij,nj->ni", linear, found["positions"]) + blended[:, :, 3]
+        rows = [np.cross(linear[:, (i + 1) % 3], linear[:, (i + 2) % 3]) for i in range(3)]  # of the cofactor matrix
+        sign = np.sign(np.einsum("ni,ni->n", linear[:, 0], rows[0]))
+        found["normals"] = np.stack([(row * found["normals"]).sum(axis=1) * sign for row in rows], axis=1)
+        if "tangents" in found:
+            found["tangents"][:, :3] = np.einsum("nij,nj->ni", linear, found["tangents"][:, :3])
+    for name in ("normals", "tangents"):
+        if name in found:
+            found[name][:, :3] = unit(found[name][:, :3])
+    return found
+
+
+def posing_figures(scene: Scene) -> dict[str, int]:
+    """Return how many meshes and vertices are posed, and the bytes of what that takes beside the scene's own streams.
+
+    That is the vertices at rest, poses, and the positions of the frame before, as if some pass asked for those.
+    """
+    poses = {placed.mesh: placed.pose for placed in scene.objects if placed.pose is not None}
+    size = sum(12 * len(mesh.positions) for mesh in scene.meshes)
+    tangents = any(mesh.tangents is not None for mesh in scene.meshes)
+    for number, pose in poses.items():
+        deform, count = scene.meshes[number].deform, len(scene.meshes[number].positions)
+        assert deform is not None
+        floats = 6 + 4 * tangents + 2 * deform.joints.shape[1] + 3 * len(deform.targets) * len(pose.weights)
+        size += 4 * (count * floats + pose.joints.size + len(pose.weights))
+    return {
+        "meshes": len(poses),
+        "vertices": sum(len(scene.meshes[number].positions) for number in poses),
+        "bytes": size,
+    }
+
+
+# Clips ----------------------------------------------------------------------------------------------------------------
+
+
+class Track(Struct, frozen=True, eq=False):
+    """Keys of one property of c nodes that share their times.
+
+    Attributes:
+        nodes: (c,).
+        times: float64 (k,), seconds, increasing.
+        values: float64 (k, c, w); rotations are unit quaternions x, y, z, w.
+        slopes: of cubic splines, float64 (2, k, c, w), arriving and leaving.
+    """
+
+    path: Literal["translation", "rotation", "scale", "weights"]
+    nodes: Ints
+    times: Doubles
+    values: Doubles
+    interpolation: Literal["LINEAR", "STEP", "CUBICSPLINE"] = "LINEAR"
+    slopes: Doubles | None = None
+
+    def at(self, time: float) -> Doubles:
+        """Return the values at a time, (c, w), held before the first and after the last key."""
+        first = int(np.searchsorted(self.times, time, side="right")) - 1
+        if first < 0 or first + 1 >= len(self.times) or self.interpolation == "STEP":
+            held: Doubles = self.values[max(0, first)]
+            return held
+        a, b = self.values[first], self.values[first + 1]
+        span = self.times[first + 1] - self.times[first]
+        t = float((time - self.times[first]) / span)
+        if self.slopes is not None:
+            leaving, arriving = span * self.slopes[1, first], span * self.slopes[0, first + 1]
+            value = (2 * t**3 - 3 * t**2 + 1) * a + (t**3 - 2 * t**2 + t) * leaving
+            value = value + (3 * t**2 - 2 * t**3) * b + (t**3 - t**2) * arriving
+            return unit(value) if self.path == "rotation" else value
+        return slerp(a, b, t) if self.path == "rotation" else a + t * (b - a)
+
+
+def slerp(a: Doubles, b: Doubles, t: float) -> Doubles:
+    """Return unit quaternions (c, 4) between others, along the shorter arc (Shoemake 1985)."""
+    cosine = (a * b).sum(axis=1, keepdims=True)
+    b, cosine = np.where(cosine < 0, -b, b), np.minimum(np.abs(cosine), 1.0)
+    angle = np.arccos(cosine)
+    sine = np.sin(angle)
+    close = sine < 1e-6
+    sine = np.where(close, 1.0, sine)
+    first = np.where(close, 1 - t, np.sin((1 - t) * angle) / sine)
+    return unit(first * a + np.where(close, t, np.sin(t * angle) / sine) * b)
+
+
+class Clip(Struct, frozen=True):
+    """An animation of a file; `length` is the time of its last key in seconds."""
+
+    name: str
+    length: float
+    tracks: tuple[Track, ...]
+
+
+class Playback(Struct, frozen=True):
+    """A clip of a file, by default its first one, from its second `start` on; it repeats."""
+
+    clip: str | None = None
+    speed: float = 1.0
+    start: float = 0.0
+
+
+class Part(Struct, frozen=True, eq=False):
+    """How an object of a file follows its nodes.
+
+    Attributes:
+        node: of which it is a part.
+        local: its transform inside the node, (4, 4).
+        skin: the skin that moves it in place of the node; -1 without.
+    """
+
+    node: int
+    local: Doubles
+    skin: int = -1
+
+
+class Skin(Struct, frozen=True, eq=False):
+    """The nodes that are joints, (j,), and the inverses of their transforms in the bind pose, (j, 4, 4)."""
+
+    joints: Ints
+    inverse_binds: Doubles
+
+
+class Rig(Struct, frozen=True, eq=False, dict=True):
+    """The n nodes of a file, what hangs on them, and how they move.
+
+    Attributes:
+        parents: (n,), -1 for roots.
+        translations, rotations, scales: (n, 3), (n, 4), (n, 3), of the nodes at rest.
+        matrices: by node its transform where it is given as a matrix, which nothing animates.
+        weights: by node those of its morph targets at rest.
+        objects, lights, cameras: what the file's placements consist of, in their order: parts, nodes and nodes.
+        placements: in `Scene.placements`, with their transforms, (4, 4); more than one where a file is repeated.
+        clip: what is played; None for the rest pose.
+    """
+
+    parents: Ints
+    translations: Doubles
+    rotations: Doubles
+    scales: Doubles
+    matrices: Mapping[int, Doubles]
+    weights: Mapping[int, Doubles]
+    skins: tuple[Skin, ...]
+    clips: Mapping[str, Clip]
+    objects: tuple[Part, ...] = ()
+    lights: tuple[int, ...] = ()
+    cameras: tuple[int, ...] = ()
+    placements: tuple[tuple[str, Doubles], ...] = (("", np.eye(4)),)
+    clip: Clip | None = None
+    playback: Playback = Playback()
+
+    @property
+    def length(self) -> float:
+        """Seconds until it repeats; 0 where nothing moves."""
+        return self.clip.length / abs(self.playback.speed) if self.clip is not None and self.playback.speed else 0.0
+
+    def at(self, time: float) -> tuple[Doubles, list[tuple[Doubles, Doubles | None, Doubles | None]]]:
+        """Return the transforms of all nodes to the file's space, (n, 4, 4), and the state of each object.
+
+        That is its transform in the file, those of its joints, (j, 3, 4), and the weights of its targets, (t,).
+        """
+        streams = {
+            "translation": self.translations.copy(), "rotation": self.rotations.copy(), "scale": self.scales.copy()
+        }  # fmt: skip
+        weights = dict(self.weights)
+        moment = self.playback.start + self.playback.speed * time
+        if self.clip is not None and self.clip.length:
+            moment %= self.clip.length
+        for track in self.clip.tracks if self.clip is not None else ():
+            if track.path == "weights":
+                weights |= dict(zip(track.nodes.tolist(), track.at(moment), strict=True))
+            else:
+                streams[track.path][track.nodes] = track.at(moment)
+        worlds = placements(**{f"{name}s": values for name, values in streams.items()})
+        for node, matrix in self.matrices.items():
+            worlds[node] = matrix
+        with np.errstate(over="ignore", invalid="ignore"):
+            for level in self._levels:
+                worlds[level] = worlds[self.parents[level]] @ worlds[level]
+        skins = [(worlds[skin.joints] @ skin.inverse_binds)[:, :3] for skin in self.skins]
+        return worlds, [
+            (part.local, skins[part.skin], weights.get(part.node))
+            if part.skin >= 0
+            else (worlds[part.node] @ part.local, None, weights.get(part.node))
+            for part in self.objects
+        ]
+
+    @cached_property
+    def _levels(self) -> list[npt.NDArray[np.int64]]:
+        """The nodes below roots, those below them, and so on."""
+        found, nodes = [], np.flatnonzero(self.parents < 0)
+        while len(nodes := np.flatnonzero(np.isin(self.parents, nodes) & (self.parents >= 0))):
+            found.append(nodes)
+        return found
+
+
+def placements(translations: Doubles, rotations: Doubles, scales: Doubles) -> Doubles:
+    """Return `T·R·S` as (n, 4, 4) of translations (n, 3), quaternions x, y, z, w (n, 4) and scales (n, 3)."""
+    x, y, z, w = rotations.T / np.array([math.hypot(*rotation) or 1.0 for rotation in rotations.tolist()])
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    found = np.tile(np.eye(4), (len(translations), 1, 1))
+    found[:, :3, :3] = np.moveaxis(np.array(rows), 2, 0) * scales[:, None]
+    found[:, :3, 3] = translations
+    return found
