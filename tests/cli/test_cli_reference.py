@@ -118,6 +118,12 @@ class Sample(Node):
     mode: Literal["a", "b"] = param(default="a", doc="Mode.")
 
 
+def test_a_description_names_the_exact_twin() -> None:
+    catalog = Catalog.discover()
+    assert describe_node(catalog.get("shadow_pcf"))["twin"] == "traced_shadows"
+    assert describe_node(catalog.get("traced_occlusion"))["twin"] is None  # of itself
+
+
 def test_a_description_says_everything() -> None:
     found = describe_node(Catalog.of(Sample).get("sample"))
     inputs = {port["name"]: port for port in found["inputs"]}

@@ -89,6 +89,8 @@ DECLARATIONS = {
     "gain: float  # here": "parameter 'gain' is a plain value; declare it with param(…), define(…) or structural(…)",
     'gain: flaot = param(default=1.0, doc="D.")  # here': "the types of its parameters cannot be worked out: NameError: name 'flaot' is not defined",
     # the class
+    'twin = "traced shadows"  # here': "`twin` is 'traced shadows'; it is the name of a node type, such as 'traced_shadows'",
+    "twin = 3  # here": "`twin` is 3; it is the name of a node type, such as 'traced_shadows'",
     'shader = "wrong.vert"  # here': "`shader` is 'wrong.vert'; it is a file that ends in .frag or .comp",
 }
 
