@@ -47,7 +47,7 @@ LATE = (
     "glcontext.egl",
     "yaml",
     "rendergraph.scene.scene_file",
-    "rendergraph.scene.shapes",
+    "rendergraph.pipelines.shapes",
     "rendergraph.nodes.display.tonemap",
     "rendergraph.nodes.geometry.gbuffer",
     "rendergraph.nodes.lighting.deferred_lighting",
