@@ -21,9 +21,9 @@ MARGIN = 24.0
 
 # One colour for each meaning, each at least 3:1 against white and against near-black, so that links show on any page.
 COLORS = {
-    **dict.fromkeys(("radiance", "display_color", "emissive", "luminance"), "#c2701c"),
+    **dict.fromkeys(("radiance", "display_color", "emissive", "luminance", "irradiance", "reflections"), "#c2701c"),
     **dict.fromkeys(("depth", "linear_depth", "shadow_map"), "#3b7dd8"),
-    **dict.fromkeys(("normal", "albedo", "material"), "#8a63d2"),
+    **dict.fromkeys(("normal", "albedo", "material", "reflectance"), "#8a63d2"),
     **dict.fromkeys(("visibility", "occlusion"), "#2c9163"),
     "shadow": "#c94f7c",
 }

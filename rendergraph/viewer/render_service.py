@@ -44,7 +44,7 @@ THUMBNAIL = 176
 """Pixels along the longer side of a small picture."""
 BINS = 64
 _MOST_CACHED = 4
-_LIGHT = frozenset({"radiance", "emissive", "luminance"})
+_LIGHT = frozenset({"radiance", "emissive", "luminance", "irradiance", "reflections"})
 
 
 @dataclass(frozen=True)
