@@ -20,7 +20,9 @@ class HeightFog(Node):
     air = Function(Air, "height_fog.glsl", doc="In-scattered radiance and transmittance from the camera to a position.")
 
     density: float = param(default=0.05, unit="1/m", min=0, max=100, doc="Extinction coefficient at `height`.")
-    height: float = param(default=0.0, unit="m", doc="World-space height (y) at which `density` is measured.")
+    height: float = param(
+        default=0.0, unit="m", min=-1e4, max=1e4, doc="World-space height (y) at which `density` is measured."
+    )
     falloff: float = param(
         default=0.3, unit="1/m", min=0, max=100, doc="Relative decrease of density per metre of height; 0 is even fog."
     )
