@@ -92,7 +92,7 @@ class Tables:
     def point(self, si: Any, first_face: Any, active: Any) -> SimpleNamespace:
         """Return the triangle, the weights of its corners, and the material with its base colour and opacity there."""
         p = SimpleNamespace()
-        p.material, mode, _, p.casts_shadow = self.face(si, first_face, active)
+        p.material, mode, p.double_sided, p.casts_shadow = self.face(si, first_face, active)
         p.vertices = dr.gather(mi.Vector3u, self.corners, first_face + si.prim_index, active)
         p.corners = [self.row("vertex.position", vertex, active).xyz for vertex in p.vertices]
         p.edges = p.corners[1] - p.corners[0], p.corners[2] - p.corners[0]
@@ -153,6 +153,7 @@ class Surface(mi.BSDF):
         self.tables, self.first_face = tables, dr.opaque(mi.UInt32, first_face)
         self.shared, self.shadows = request["shared"], request["shadows"]
         self.lights = request["lights"] if tables.lets_light_through else []
+        self.camera = request["camera"]
         flags = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.GlossyReflection
         flags |= mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
         flags |= mi.BSDFFlags.Null if tables.passes_light else flags
@@ -164,6 +165,8 @@ class Surface(mi.BSDF):
     def point(self, si: Any, active: Any) -> SimpleNamespace:
         """Return everything that reflection depends on."""
         tables, p = self.tables, self.tables.point(si, self.first_face, active)
+        if tables.passes_light:
+            p.alpha = dr.select(self.is_culled(p, si), 0, p.alpha)
         rows = (tables.row(f"material.{name}", p.material, active) for name in ("surface", "specular", "extra"))
         surface, specular, extra = rows
         slots = ("metallic_roughness", "specular", "specular_color", "anisotropy")
@@ -177,12 +180,20 @@ class Surface(mi.BSDF):
         p.alpha_t = dr.lerp(p.alpha_b, 1, dr.square(extra.y * grain.z))
         p.frame = self.frame(p, si, surface.w, extra.z, grain, active)
         p.view = p.frame.to_local(si.to_world(si.wi))
-        # A shading normal may lean away from the viewer; its lobes are sampled as if seen from its horizon.
+        # A shading normal may lean away from the viewer; visible microfacets are then those seen from its horizon.
         p.upper = dr.normalize(mi.Vector3f(p.view.x, p.view.y, dr.maximum(p.view.z, 1e-4)))
         p.lobe = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, p.alpha_t, p.alpha_b, True)
         glossy, diffuse = mi.luminance(p.f0 + (p.f90 - p.f0) * (1 - p.upper.z) ** 5), mi.luminance(p.diffuse)
-        p.share = dr.select(diffuse > 0, dr.clip(glossy / dr.maximum(glossy + diffuse, 1e-6), 0.1, 0.9), 1)
+        p.share = dr.clip(glossy / dr.maximum(glossy + diffuse, 1e-6), 0.1, 0.9)  # never 1: no direction is lost
         return p
+
+    def is_culled(self, p: SimpleNamespace, si: Any) -> Any:
+        """Return whether a ray of the camera meets a back that it does not see, behind something transparent."""
+        along = mi.Vector3f(*self.camera["direction"][0])
+        if not np.any(self.camera["origin"][1:]):  # all rays come from the eye
+            along = si.p - mi.Point3f(*self.camera["origin"][0])
+        is_camera = dr.squared_norm(dr.normalize(along) + si.to_world(si.wi)) < _SAME_DIRECTION
+        return is_camera & (si.wi.z < 0) & (p.double_sided == 0)
 
     def frame(self, p: SimpleNamespace, si: Any, scale: Any, angle: Any, grain: Any, active: Any) -> Any:
         """Return the shading frame in world space: x along the grain, z the normal on the viewer's side."""
@@ -208,7 +219,7 @@ class Surface(mi.BSDF):
         active = active & (light.z > 0) & ((wo.z * si.wi.z > 0) | (not self.shadows))
         view, half = mi.Vector3f(p.view.x, p.view.y, dr.maximum(p.view.z, 1e-4)), dr.normalize(p.view + light)
         weight = (1 - dr.clip(dr.dot(p.view, half), 0, 1)) ** 5
-        slope = mi.Vector3f(half.x / p.alpha_t, half.y / p.alpha_b, half.z)
+        slope = mi.Vector3f(half.x / p.alpha_t, half.y / p.alpha_b, dr.maximum(half.z, 0))
         distribution = dr.rcp(dr.pi * p.alpha_t * p.alpha_b * dr.square(dr.squared_norm(slope)))
         stretch = mi.Vector3f(p.alpha_t, p.alpha_b, 1)
         visibility = 0.5 / (light.z * dr.norm(stretch * view) + view.z * dr.norm(stretch * light))
@@ -216,8 +227,7 @@ class Surface(mi.BSDF):
         if self.shared:
             value *= 1 - dr.max(p.dielectric_f0 + (p.dielectric_f90 - p.dielectric_f0) * weight)
         value += (p.f0 + (p.f90 - p.f0) * weight) * (distribution * visibility)
-        middle = dr.normalize(p.upper + light)
-        density = p.share * p.lobe.pdf(p.upper, middle) / (4 * dr.dot(light, middle))
+        density = p.share * p.lobe.pdf(p.upper, half) / (4 * dr.dot(light, half))
         density += (1 - p.share) * mi.warp.square_to_cosine_hemisphere_pdf(light)
         return value * (light.z * p.alpha) & active, dr.select(active, density * p.alpha, 0)
 
@@ -226,7 +236,7 @@ class Surface(mi.BSDF):
         passes = sample1 >= p.alpha
         half, _ = p.lobe.sample(p.upper, sample2)
         is_glossy = sample1 < p.alpha * p.share
-        light = dr.select(is_glossy, mi.reflect(p.upper, half), mi.warp.square_to_cosine_hemisphere(sample2))
+        light = dr.select(is_glossy, mi.reflect(p.view, half), mi.warp.square_to_cosine_hemisphere(sample2))
         wo = si.to_local(p.frame.to_world(light))
         value, density = self.reflect(p, si, wo, active)
         bs = mi.BSDFSample3f()

@@ -23,6 +23,7 @@ from rendergraph.compare import compare
 from rendergraph.images import read, write
 from rendergraph.mitsuba import Tracer
 from rendergraph.mitsuba.installation import find_llvm
+from rendergraph.resources import shipped_pipelines
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.load import load
 from rendergraph.scene.model import Scene
@@ -400,6 +401,58 @@ def test_masks_let_light_through_where_they_are_transparent(tmp_path: Path) -> N
     light, _ = trace(scene, (8, 8), 4, bounces=0)
     assert light[:, :4].min() > 0.4
     assert light[:, 4:].max() == 0
+
+
+def test_the_camera_sees_no_back_behind_transparent_fronts(tmp_path: Path) -> None:
+    """A black box of opacity one half covers a shining wall once."""
+    scene = scene_of(
+        tmp_path,
+        "objects:\n  wall: {shape: plane, size: [9, 9], material: wall}\n"
+        "  box: {shape: box, size: [4, 1, 4], at: [0, 1, 0], material: box}\n"
+        "materials:\n  wall: {base_color: 0, specular: 0, emissive: [1, 1, 1]}\n"
+        "  box: {base_color: [0, 0, 0, 0.5], specular: 0, alpha_mode: blend}\n"
+        "cameras: {main: {eye: [0, 3, 0], target: [0, 0, 0], up: [0, 0, -1], fov_y_degrees: 20}}\n",
+    )
+    light, _ = trace(scene, (16, 16), 256, bounces=0)
+    assert light.mean() == pytest.approx(0.5, abs=0.01)
+
+
+# --- against our own path tracer -------------------------------------------------------------------------------------
+
+
+@pytest.mark.skipif("path-traced" not in shipped_pipelines(), reason="no path tracer")
+@pytest.mark.parametrize(
+    ("scene", "environment"),
+    [
+        ("cornell_box", None),
+        ("shapes", None),
+        ("lantern", None),
+        ("glass", None),
+        ("assets/gltf/WaterBottle/WaterBottle.gltf", "studio"),
+        ("assets/gltf/AlphaBlendModeTest.glb", None),
+    ],
+    ids=lambda value: Path(value).stem if value else "",
+)
+def test_the_path_tracer_agrees(session: rg.Session, shared: Path, scene: str, environment: str | None) -> None:
+    """Means over blocks of 8×8 pixels within their noise, and the mean of the picture."""
+    size, samples, bounces = (120, 88), 64, 3
+    source = shared / scene if "/" in scene else scene
+    sets = (f"light.max_bounces={bounces}", f"light.samples={samples}", "light.ambient=0")
+    pipeline = rg.load("path-traced", scene=source, environment=environment, size=size, sets=sets)
+    frame = pipeline.render(session=session, outputs=["radiance", "variance"])
+    ours, our_variance = (frame[name][..., :3].astype(np.float64) for name in ("radiance", "variance"))
+    light, error = trace(pipeline.link().scene, size, samples, bounces=bounces)
+    variance = our_variance + error**2
+    ceiling = np.percentile(variance, 99.5)  # single paths that found a lamp by chance say nothing
+    calm = (variance <= ceiling).all(axis=-1, keepdims=True)
+
+    def blocks(values: Floats) -> Floats:
+        return np.asarray((values * calm).reshape(size[1] // 8, 8, size[0] // 8, 8, 3).sum(axis=(1, 3)) / 64)
+
+    difference, noise = blocks(ours - light), np.sqrt(blocks(variance) / 64)
+    allowed = noise + 0.004 * blocks(light) + 1e-6  # filters of half floats, and rounding
+    assert np.mean(abs(difference) < 3 * allowed) > 0.97
+    assert abs(difference.mean()) < 0.004 * light.mean() + 4 * np.sqrt((noise**2).sum()) / noise.size
 
 
 def test_comparisons_take_it_as_a_truth() -> None:
