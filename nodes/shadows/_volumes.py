@@ -207,7 +207,8 @@ class CountsVolumes(HasVolumes):
             for index in casters:
                 if methods[layer, index] == method:
                     entry = scene.objects[index]
-                    found = silhouette(scene.meshes[entry.mesh], entry.transform, homogeneous_position(lights[layer]))
+                    mesh, light = scene.meshes[entry.mesh], homogeneous_position(lights[layer])
+                    found = silhouette(mesh, entry.transform, light, entry.pose)
                     sides.append(_as_vec4(found.sides))
                     if method == Z_FAIL or self.length_of_sides > 0:
                         faces.append(_as_vec4(found.lit))
@@ -245,8 +246,8 @@ def homogeneous_position(light: Any) -> Points:
 
 def bounding_spheres(scene: Any) -> tuple[Points, Points]:
     """Return centres (n, 3) and radii (n,) of bounding spheres of the scene's objects in world space."""
-    boxes = np.array([mesh.box for mesh in scene.meshes], np.float64).reshape(-1, 2, 3)
-    object_boxes = boxes[[entry.mesh for entry in scene.objects]]
+    boxes = [(entry.pose or scene.meshes[entry.mesh]).box for entry in scene.objects]
+    object_boxes = np.array(boxes, np.float64).reshape(-1, 2, 3)
     transforms = np.array([entry.transform for entry in scene.objects]).reshape(-1, 4, 4)
     middle, half = object_boxes.mean(axis=1), np.ptp(object_boxes, axis=1) / 2
     centers = np.einsum("nij,nj->ni", transforms[:, :3, :3], middle) + transforms[:, :3, 3]

@@ -100,23 +100,19 @@ def plan(
       rendergraph plan forward-prepass --size 1920x1080 --json
     """
     from rendergraph import diagrams
+    from rendergraph.scene.scene_data import posing_figures
     from rendergraph.session import RenderOptions, stages
 
     render_options = RenderOptions(alias=not no_alias, heap=heap, shuffle=shuffle)
     linked = options.link(selection)
-    plan, posing = stages.plan(stages.expand(linked, render_options)).plan, None
-    if any(placed.pose is not None for placed in linked.scene.objects):
-        from rendergraph.scene.rig import posing_figures  # for animated meshes alone
-
-        posing = posing_figures(linked.scene)
+    plan, posing = stages.plan(stages.expand(linked, render_options)).plan, posing_figures(linked.scene)
     if as_json:
-        emit_json(diagrams.plan_json(plan) | ({"posing": posing} if posing else {}))
+        emit_json(diagrams.plan_json(plan) | ({"posing": posing} if posing["meshes"] else {}))
         return
-    if posing:
-        emit(
-            "before step 1, where a pose has changed\n  {meshes} animated meshes, {vertices} vertices".format(**posing)
-        )
-        emit(f"  a compute shader writes the streams that all steps read; it has {format_bytes(posing['bytes'])}\n")
+    if posing["meshes"]:
+        what = f"{amount(posing['meshes'], 'animated mesh', 'animated meshes')}, {posing['vertices']} vertices"
+        when = "in a compute shader before step 1, when a pose has changed"
+        emit(f"posing\n  {what}, {format_bytes(posing['bytes'])}; {when}\n")
     emit(diagrams.plan_text(plan, every_step=every_step).rstrip("\n"))
 
 

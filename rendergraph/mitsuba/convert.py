@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from msgspec.structs import asdict
 
+from rendergraph.scene.animate import baked
 from rendergraph.scene.model import ImageSource, MadeImage, Scene
 from rendergraph.scene.pack import SLOTS, PackedScene, pack
 from rendergraph.steps import ViewMatrices
@@ -30,6 +31,7 @@ def scene_values(scene: Scene, decode: Decode) -> tuple[dict[str, Any], dict[str
 
     A mesh has its emissive material, or -1, and the number of its first vertex and triangle, and of all of them.
     """
+    scene = baked(scene)
     packed = pack(scene)
     arrays = {f"material.{name}": packed.materials[name] for name in _ROWS} | _textures(scene, packed, decode)
     for number, surface in enumerate(scene.materials):

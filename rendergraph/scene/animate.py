@@ -54,12 +54,17 @@ def play(scene: Scene, playback: Playback | None) -> Scene:
     if playback is not None:
         clip = rig.clips[playback.clip or next(iter(rig.clips))]
         return _posed(replace(scene, rigs=(replace(rig, clip=clip, playback=playback),)), 0.0)
-    scene, meshes = _posed(scene, 0.0), list(scene.meshes)
-    for placed in scene.objects:
-        if placed.pose is not None and meshes[placed.mesh].deform is not None:
-            meshes[placed.mesh] = meshes[placed.mesh].baked(placed.pose)
-    objects = tuple(replace(placed, pose=None) for placed in scene.objects)
-    return replace(scene, objects=objects, meshes=tuple(meshes), rigs=(), placements={})
+    return replace(baked(_posed(scene, 0.0)), rigs=(), placements={})
+
+
+def baked(scene: Scene) -> Scene:
+    """Return the scene at a moment with meshes that are as they are posed, and nothing that says so."""
+    poses = {placed.mesh: placed.pose for placed in scene.objects if placed.pose is not None}
+    meshes = list(scene.meshes)
+    for number, pose in poses.items():
+        meshes[number] = replace(meshes[number], deform=None, **pose.vertices())
+    objects = tuple(replace(placed, pose=None) if placed.pose is not None else placed for placed in scene.objects)
+    return replace(scene, objects=objects, meshes=tuple(meshes)) if poses else scene
 
 
 def moving_plugin_keys(scene: Scene) -> set[str]:
@@ -114,9 +119,9 @@ def _posed(scene: Scene, time_s: float) -> Scene:
             )
             for (index, _), (_, *state) in zip(now.objects, parts, strict=True):
                 number = objects[index].mesh
-                if scene.meshes[number].deform is not None:
+                if (deform := scene.meshes[number].deform) is not None:
                     if number not in poses:
-                        poses[number] = scene.meshes[number].pose(*state)
+                        poses[number] = deform.pose(*state)
                     objects[index] = replace(objects[index], pose=poses[number])
         scene = _placed_again(replace(scene, objects=tuple(objects), placements=placements), rig.placements, moved)
     return scene

@@ -93,7 +93,7 @@ def _reaches(
         by_mesh.setdefault((entry.mesh, entry.pose), []).append(entry.transform)
     many = sum(len(scene.meshes[mesh].positions) * len(placed) for (mesh, _), placed in by_mesh.items()) > most_points
     for (mesh, pose), placed in by_mesh.items():
-        points = np.asarray(scene.meshes[mesh].baked(pose).positions, np.float64)
+        points = np.asarray(scene.meshes[mesh].positions if pose is None else pose.vertices()["positions"], np.float64)
         if many:
             low, high = (corner.astype(np.float64) for corner in (pose or scene.meshes[mesh]).box)
             corners = np.array(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij"))

@@ -27,7 +27,7 @@ from rendergraph.scene.edges import Edges, find_edges, is_solid
 from rendergraph.stamps import Stamps
 
 if TYPE_CHECKING:
-    from rendergraph.scene.rig import Deform, Ints, Pose, Rig
+    from rendergraph.scene.rig import Deform, Pose, Rig
 
 Floats: TypeAlias = npt.NDArray[np.float32]
 Matrix: TypeAlias = npt.NDArray[np.float64]
@@ -118,34 +118,6 @@ class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
     @cached_property
     def edges(self) -> Edges:
         return find_edges(self.positions, self.indices)
-
-    def baked(self, pose: Pose | None) -> Mesh:
-        """Return it as it is in a pose, to stay so; the same for None."""
-        if pose is None:
-            return self
-        from rendergraph.scene.rig import posed  # for animated meshes alone
-
-        return replace(self, deform=None, **{key: found.astype(np.float32) for key, found in posed(self, pose).items()})
-
-    def pose(self, joints: Matrix | None, weights: Matrix | None) -> Pose:
-        """Return a pose of it, with transforms of its joints, (j, 3, 4), and weights of its targets, (t,)."""
-        from rendergraph.scene.rig import pose_of  # for animated meshes alone
-
-        return pose_of(self, joints, weights)
-
-    @cached_property
-    def joint_boxes(self) -> tuple[Ints, Matrix, Matrix]:
-        """Joints that move some vertex, (u,), and the box of what each of them moves, (u, 3) twice."""
-        from rendergraph.scene.rig import joint_boxes  # likewise
-
-        return joint_boxes(self)
-
-    @cached_property
-    def target_boxes(self) -> tuple[Matrix, Matrix]:
-        """Least and greatest displacements of its morph targets, (t, 3) each."""
-        assert self.deform is not None
-        deltas = self.deform.targets["positions"].astype(np.float64)
-        return deltas.min(axis=1), deltas.max(axis=1)
 
 
 class SceneLimits(Struct, frozen=True):

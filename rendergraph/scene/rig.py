@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -13,134 +13,111 @@ from msgspec import Struct
 
 from rendergraph.projection import unit
 
-if TYPE_CHECKING:
-    from rendergraph.scene.model import Mesh, Scene
-
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
-Box = tuple[Doubles, Doubles]
 
 _BOX_SLACK = 1e-5
 """Of the sizes of the terms that a posed vertex is summed from: more than single precision loses in them."""
 
 
-class Deform(Struct, frozen=True, eq=False):
+class Deform(Struct, frozen=True, eq=False, dict=True):
     """How the n vertices of a mesh follow joints and morph targets.
 
     Attributes:
+        rest: `positions`, `normals` and perhaps `tangents` of the mesh in its bind pose, float32 (n, 3 or 4).
+        targets: by stream the displacements of t targets, float32 (t, n, 3); positions always.
         joints: int32 (n, k), the joints of each vertex, k = 0 without a skin.
         weights: float32 (n, k), not negative, with a sum of 1.
-        targets: by stream (`positions`, `normals`, `tangents`) the displacements of t targets, float32 (t, n, 3).
     """
 
+    rest: Mapping[str, Floats]
+    targets: Mapping[str, Floats]
     joints: Ints
     weights: Floats
-    targets: Mapping[str, Floats]
 
     def at(self, vertices: npt.NDArray[np.integer]) -> Deform:
         """Return the same for some of the vertices, in another order."""
+        rest = {name: stream[vertices] for name, stream in self.rest.items()}
         targets = {name: deltas[:, vertices] for name, deltas in self.targets.items()}
-        return Deform(self.joints[vertices], self.weights[vertices], targets)
+        return Deform(rest, targets, self.joints[vertices], self.weights[vertices])
+
+    @cached_property
+    def joint_boxes(self) -> tuple[Ints, Doubles, Doubles]:
+        """Joints that move some vertex, (u,), and the box of what each of them moves, (u, 3) twice; one without any."""
+        positions, joints, weights = self.rest["positions"].astype(np.float64), self.joints, self.weights
+        if not joints.shape[1]:
+            joints, weights = np.zeros((len(positions), 1), np.int32), np.ones((len(positions), 1), np.float32)
+        low = np.full((int(joints.max()) + 1, 3), np.inf)
+        high = -low
+        for joint, weight in zip(joints.T, weights.T, strict=True):
+            np.minimum.at(low, joint[weight > 0], positions[weight > 0])
+            np.maximum.at(high, joint[weight > 0], positions[weight > 0])
+        used = np.flatnonzero(low[:, 0] <= high[:, 0]).astype(np.int32)
+        return used, low[used], high[used]
+
+    @cached_property
+    def target_boxes(self) -> tuple[Doubles, Doubles]:
+        """Least and greatest displacements of the targets, (t, 3) each."""
+        deltas = self.targets["positions"].astype(np.float64)
+        return deltas.min(axis=1), deltas.max(axis=1)
+
+    def pose(self, joints: Doubles, weights: Doubles) -> Pose:
+        """Return a pose with its box. A vertex is a mean of where each joint has it, so it lies in their hull."""
+        used, low, high = self.joint_boxes
+        least, most = self.target_boxes
+        center = (low + high) / 2 + weights @ ((least + most) / 2)
+        extent = (high - low) / 2 + np.abs(weights) @ ((most - least) / 2)
+        size = np.abs(center) + extent
+        if len(joints):
+            linear, offset = joints[used, :, :3], joints[used, :, 3]
+            center = np.einsum("jik,jk->ji", linear, center) + offset
+            extent = np.einsum("jik,jk->ji", np.abs(linear), extent)
+            size = np.einsum("jik,jk->ji", np.abs(linear), size) + np.abs(offset)
+        extent = extent + _BOX_SLACK * size
+        return Pose(self, joints, weights, ((center - extent).min(axis=0), (center + extent).max(axis=0)))
 
 
 class Pose(Struct, frozen=True, eq=False):
     """What moves the vertices of one mesh at a moment; all objects of the mesh have the same.
 
     Attributes:
-        joints: float64 (j, 3, 4), from the mesh to the object: the joint's transform times the inverse of its bind
-            pose; j = 0 without a skin.
+        joints: float64 (j, 3, 4), from the mesh to the object: a joint's transform times the inverse of its bind pose;
+            j = 0 without a skin.
         weights: float64 (t,), of the morph targets.
         box: least and greatest corner, which contain all posed vertices.
     """
 
+    deform: Deform
     joints: Doubles
     weights: Doubles
-    box: Box
+    box: tuple[Doubles, Doubles]
 
     def is_like(self, other: Pose | None) -> bool:
         return other is not None and all(
             map(np.array_equal, (self.joints, self.weights), (other.joints, other.weights))
         )
 
-
-def pose_of(mesh: Mesh, joints: Doubles | None, weights: Doubles | None) -> Pose:
-    """Return a pose with its box. A vertex is a mean of where each joint would have it, so it lies in their hull."""
-    used, low, high = mesh.joint_boxes
-    center, extent = (low + high) / 2, (high - low) / 2
-    if weights is not None and len(weights):
-        least, most = mesh.target_boxes
-        center = center + weights @ ((least + most) / 2)
-        extent = extent + np.abs(weights) @ ((most - least) / 2)
-    size = np.abs(center) + extent
-    if joints is not None:
-        linear, offset = joints[used, :, :3], joints[used, :, 3]
-        center = np.einsum("jik,jk->ji", linear, center) + offset
-        extent = np.einsum("jik,jk->ji", np.abs(linear), extent)
-        size = np.einsum("jik,jk->ji", np.abs(linear), size) + np.abs(offset)
-    extent = extent + _BOX_SLACK * size
-    joints, weights = (np.zeros((0, 3, 4)) if joints is None else joints), (np.zeros(0) if weights is None else weights)
-    return Pose(joints, weights, ((center - extent).min(axis=0), (center + extent).max(axis=0)))
-
-
-def joint_boxes(mesh: Mesh) -> tuple[Ints, Doubles, Doubles]:
-    """Return the joints that move some vertex, (u,), and the box of what each of them moves, (u, 3) twice."""
-    assert mesh.deform is not None
-    positions, joints, weights = mesh.positions.astype(np.float64), mesh.deform.joints, mesh.deform.weights
-    if not joints.shape[1]:
-        return np.zeros(1, np.int32), positions.min(axis=0)[None], positions.max(axis=0)[None]
-    low = np.full((int(joints.max()) + 1, 3), np.inf)
-    high = -low
-    for joint, weight in zip(joints.T, weights.T, strict=True):
-        np.minimum.at(low, joint[weight > 0], positions[weight > 0])
-        np.maximum.at(high, joint[weight > 0], positions[weight > 0])
-    used = np.flatnonzero(low[:, 0] <= high[:, 0]).astype(np.int32)
-    return used, low[used], high[used]
-
-
-def posed(mesh: Mesh, pose: Pose) -> dict[str, Doubles]:
-    """Return positions, normals and, if it has some, tangents of a mesh in a pose, float64."""
-    deform = mesh.deform
-    assert deform is not None
-    found = {
-        name: stream.astype(np.float64) for name in ("positions", "normals", "tangents")
-        if (stream := getattr(mesh, name)) is not None
-    }  # fmt: skip
-    for name, deltas in deform.targets.items():
-        found[name][:, :3] += np.tensordot(pose.weights, deltas.astype(np.float64), 1)
-    if len(pose.joints):
-        blended = np.einsum("nk,nkij->nij", deform.weights.astype(np.float64), pose.joints[deform.joints])
-        linear = blended[:, :, :3]
-        found["positions"] = np.einsum("nij,nj->ni", linear, found["positions"]) + blended[:, :, 3]
-        rows = [np.cross(linear[:, (i + 1) % 3], linear[:, (i + 2) % 3]) for i in range(3)]  # of the cofactor matrix
-        sign = np.sign(np.einsum("ni,ni->n", linear[:, 0], rows[0]))
-        found["normals"] = np.stack([(row * found["normals"]).sum(axis=1) * sign for row in rows], axis=1)
-        if "tangents" in found:
-            found["tangents"][:, :3] = np.einsum("nij,nj->ni", linear, found["tangents"][:, :3])
-    for name in ("normals", "tangents"):
-        if name in found:
+    def vertices(self) -> dict[str, Floats]:
+        """Return the posed streams of `Deform.rest`, worked out in float64."""
+        found = {name: stream.astype(np.float64) for name, stream in self.deform.rest.items()}
+        for name, deltas in self.deform.targets.items():
+            found[name][:, :3] += np.tensordot(self.weights, deltas.astype(np.float64), 1)
+        if len(self.joints):
+            weights = self.deform.weights.astype(np.float64)
+            blended = np.einsum("nk,nkij->nij", weights, self.joints[self.deform.joints])
+            linear = blended[:, :, :3]
+            rows = [
+                np.cross(linear[:, (i + 1) % 3], linear[:, (i + 2) % 3]) for i in range(3)
+            ]  # of the cofactor matrix
+            sign = np.sign((linear[:, 0] * rows[0]).sum(axis=1))
+            found["normals"] = np.stack([(row * found["normals"]).sum(axis=1) * sign for row in rows], axis=1)
+            for name in ("positions", "tangents") & found.keys():
+                found[name][:, :3] = np.einsum("nij,nj->ni", linear, found[name][:, :3])
+            found["positions"] += blended[:, :, 3]
+        for name in ("normals", "tangents") & found.keys():
             found[name][:, :3] = unit(found[name][:, :3])
-    return found
-
-
-def posing_figures(scene: Scene) -> dict[str, int]:
-    """Return how many meshes and vertices are posed, and the bytes of what that takes beside the scene's own streams.
-
-    That is the vertices at rest, poses, and the positions of the frame before, as if some pass asked for those.
-    """
-    poses = {placed.mesh: placed.pose for placed in scene.objects if placed.pose is not None}
-    size = sum(12 * len(mesh.positions) for mesh in scene.meshes)
-    tangents = any(mesh.tangents is not None for mesh in scene.meshes)
-    for number, pose in poses.items():
-        deform, count = scene.meshes[number].deform, len(scene.meshes[number].positions)
-        assert deform is not None
-        floats = 6 + 4 * tangents + 2 * deform.joints.shape[1] + 3 * len(deform.targets) * len(pose.weights)
-        size += 4 * (count * floats + pose.joints.size + len(pose.weights))
-    return {
-        "meshes": len(poses),
-        "vertices": sum(len(scene.meshes[number].positions) for number in poses),
-        "bytes": size,
-    }
+        return {name: stream.astype(np.float32) for name, stream in found.items()}
 
 
 # Clips ----------------------------------------------------------------------------------------------------------------
@@ -262,7 +239,7 @@ class Rig(Struct, frozen=True, eq=False, dict=True):
         """Seconds until it repeats; 0 where nothing moves."""
         return self.clip.length / abs(self.playback.speed) if self.clip is not None and self.playback.speed else 0.0
 
-    def at(self, time: float) -> tuple[Doubles, list[tuple[Doubles, Doubles | None, Doubles | None]]]:
+    def at(self, time: float) -> tuple[Doubles, list[tuple[Doubles, Doubles, Doubles]]]:
         """Return the transforms of all nodes to the file's space, (n, 4, 4), and the state of each object.
 
         That is its transform in the file, those of its joints, (j, 3, 4), and the weights of its targets, (t,).
@@ -285,11 +262,14 @@ class Rig(Struct, frozen=True, eq=False, dict=True):
         with np.errstate(over="ignore", invalid="ignore"):
             for level in self._levels:
                 worlds[level] = worlds[self.parents[level]] @ worlds[level]
-        skins = [(worlds[skin.joints] @ skin.inverse_binds)[:, :3] for skin in self.skins]
+        # Of an object without a skin -1 finds the last entry: no joints.
+        skins = [*((worlds[skin.joints] @ skin.inverse_binds)[:, :3] for skin in self.skins), np.zeros((0, 3, 4))]
         return worlds, [
-            (part.local, skins[part.skin], weights.get(part.node))
-            if part.skin >= 0
-            else (worlds[part.node] @ part.local, None, weights.get(part.node))
+            (
+                part.local if part.skin >= 0 else worlds[part.node] @ part.local,
+                skins[part.skin],
+                weights.get(part.node, np.zeros(0)),
+            )
             for part in self.objects
         ]
 

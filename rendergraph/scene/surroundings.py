@@ -84,10 +84,11 @@ def _surface_points(scene: Scene) -> tuple[npt.NDArray[np.float64], npt.NDArray[
     visible = [entry for entry in scene.objects if not entry.hidden]
     points, normals = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for entry in visible[:: max(1, len(visible) // _MOST_POINTS)]:
-        mesh, linear = scene.meshes[entry.mesh].baked(entry.pose), entry.transform[:3, :3]
+        mesh, linear = scene.meshes[entry.mesh], entry.transform[:3, :3]
         step = max(1, len(mesh.positions) * len(visible) // _MOST_POINTS)
-        points.append(mesh.positions[::step].astype(np.float64) @ linear.T + entry.transform[:3, 3])
-        normals.append(mesh.normals[::step].astype(np.float64) @ np.linalg.pinv(linear))
+        streams = {"positions": mesh.positions, "normals": mesh.normals} if not entry.pose else entry.pose.vertices()
+        points.append(streams["positions"][::step].astype(np.float64) @ linear.T + entry.transform[:3, 3])
+        normals.append(streams["normals"][::step].astype(np.float64) @ np.linalg.pinv(linear))
     directions = np.concatenate(normals)
     return np.concatenate(points), directions / np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-30)
 

@@ -74,7 +74,10 @@ class FrameScene(Protocol):
 
     @property
     def objects(self) -> Sequence[Any]:
-        """Placed objects with `name`, `mesh`, `material`, `transform`, `casts_shadow`, `hidden`."""
+        """Placed objects with `name`, `mesh`, `material`, `transform`, `casts_shadow`, `hidden`, `pose`.
+
+        `pose` is None, or has the `box` of an animated mesh and `vertices()`, its `positions` and `normals` now.
+        """
         ...
 
     @property

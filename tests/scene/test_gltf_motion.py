@@ -552,7 +552,7 @@ outputs: {velocity: gbuffer.velocity, depth: gbuffer.depth}
     assert np.abs((found - expected) * SIZE).max() < 0.02
 
 
-@pytest.mark.parametrize("name", ["shadow-cascaded", "traced-shadows", "taa"])
+@pytest.mark.parametrize("name", ["shadow-cascaded", "traced-shadows", "taa", "shadow-volumes-zfail"])
 def test_reused_steps_and_culling_see_the_pose(gl: rg.Session, stage: Path, name: str) -> None:
     """Frames are those in which every step runs and every object is drawn, in whatever order they come."""
     pipeline = rg.load(name, scene=stage, size=(64, 40))
@@ -561,6 +561,32 @@ def test_reused_steps_and_culling_see_the_pose(gl: rg.Session, stage: Path, name
     np.testing.assert_array_equal(frames, whole)
     assert (frames[0] != frames[4]).mean() > 0.02
     np.testing.assert_array_equal(gl.render(pipeline, frames=range(3, 4))["image"], frames[2])
+
+
+@pytest.mark.parametrize(
+    ("name", "sets"),
+    [
+        ("shadow-volumes-zfail", ["shadows.silhouettes=cpu"]),
+        ("shadow-volumes-zfail", ["shadows.silhouettes=gpu"]),
+        ("traced-shadows", []),
+    ],
+)
+def test_a_pose_draws_what_its_baked_mesh_draws(gl: rg.Session, stage: Path, name: str, sets: list[str]) -> None:
+    """A file that stands still in the pose of a moment has the same picture as the clip at that moment."""
+    pipeline = rg.load(name, scene=stage, size=(64, 40), sets=sets)
+    found = gl.render(pipeline, frames=range(5, 6))["image"].astype(int)
+    scene = pipeline.link().scene
+    file = json.loads((stage.parent / "worm.gltf").read_text())
+    mesh = animate.baked(animate.at(scene, 4 / 30)).meshes[scene.objects[-1].mesh]
+    made = File()
+    attributes = {"POSITION": made.array(mesh.positions, "VEC3"), "NORMAL": made.array(mesh.normals, "VEC3")}
+    indices = made.array(mesh.indices, "SCALAR", "<u4")
+    made.json["meshes"] = [{"primitives": [{"attributes": attributes, "indices": indices}]}]
+    made.json["nodes"], made.json["scenes"] = [{"name": file["nodes"][0]["name"], "mesh": 0}], [{"nodes": [0]}]
+    made.write(stage.parent / "worm.gltf")
+    stage.write_text(STAGE.replace("animation: {}, ", ""))
+    expected = gl.render(rg.load(name, scene=stage, size=(64, 40), sets=sets))["image"].astype(int)
+    assert (np.abs(found - expected).max(axis=-1) > 2).mean() < 0.002
 
 
 def light(picture: Any) -> Any:

@@ -87,7 +87,8 @@ class Primitives:
         found, still = deform.at(triangles.reshape(-1)), made.normals
         bent = [flat(replace(mesh, positions=mesh.positions + d)).normals - still for d in deform.targets["positions"]]
         targets = {"positions": found.targets["positions"], **({"normals": np.stack(bent)} if bent else {})}
-        return replace(made, deform=replace(found, targets=targets))
+        rest = {"positions": made.positions, "normals": still}
+        return replace(made, deform=replace(found, rest=rest, targets=targets))
 
     def _error(self, text: str) -> InputError:
         return self._reading.error("RG304", text)
@@ -139,7 +140,8 @@ class Primitives:
             what = f"sum to {total[vertex, 0]:g}" if total[vertex, 0] <= 0 else "are partly negative"
             raise self._error(f"{where}.WEIGHTS_0: the weights of vertex {vertex} {what}")
         joint[share == 0] = 0
-        return Deform(joint, (share / total).astype(np.float32), self._targets(where, primitive, mesh))
+        rest = {name: stream for name in _TARGETS.values() if (stream := getattr(mesh, name)) is not None}
+        return Deform(rest, self._targets(where, primitive, mesh), joint, (share / total).astype(np.float32))
 
     def _targets(self, where: str, primitive: Primitive, mesh: Mesh) -> dict[str, Floats]:
         """The displacements of the morph targets, float32 (t, n, 3) by stream."""
