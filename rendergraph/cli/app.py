@@ -60,24 +60,6 @@ VERBS = (
 )
 """In the order of `--help`."""
 
-_SYNONYMS = {
-    "render": "run",
-    "draw": "run",
-    "serve": "view",
-    "lint": "check",
-    "validate": "check",
-    "show": "graph",
-    "list": "pipelines",
-    "benchmark": "bench",
-    "profile": "bench",
-    "help": "explain",
-    "open": "view",
-    "new": "init",
-    "create": "init",
-    "start": "init",
-}
-"""What other programs call our verbs."""
-
 INTERRUPTED = 130
 
 
@@ -117,14 +99,16 @@ class _Verbs(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if args[0] not in VERBS and not args[0].startswith("-"):
-            meant = _SYNONYMS.get(args[0].lower()) or (f"run {args[0]}" if _is_pipeline(args[0]) else None)
+            from rendergraph.cli.suggestions import meant_by  # only needed where a verb is misspelt
+
+            meant = meant_by(args[0].lower(), "verbs") or (f"run {args[0]}" if _is_pipeline(args[0]) else None)
             hint = f"; did you mean '{meant}'?" if meant else suggestion(args[0], VERBS)
             ctx.fail(f"unknown verb '{args[0]}'{hint}")
         return super().resolve_command(ctx, args)
 
 
 def _is_pipeline(word: str) -> bool:
-    from rendergraph.resources import shipped_pipelines  # only needed where a verb is misspelt
+    from rendergraph.resources import shipped_pipelines  # see above
 
     return word in shipped_pipelines() or word.endswith((".yaml", ".yml"))
 

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Iterator, Mapping
 from inspect import get_annotations, getattr_static
+from pathlib import Path
 from typing import Literal, get_args, get_origin
 from weakref import WeakSet
 
@@ -23,34 +24,14 @@ _MACRO = re.compile(r"[A-Za-z0-9_-]+")
 _OF_THE_BASE = frozenset(name for name in vars(Node) if not name.startswith("_"))
 _CLASS_METHODS = [name for name, value in vars(Node).items() if isinstance(value, classmethod)]
 
-# Words that cannot be a GLSL identifier, that hide a built-in function used everywhere, or that the base class owns.
-RESERVED_NAMES: frozenset[str] = (
-    frozenset(
-        """
-    attribute const uniform varying buffer shared coherent volatile restrict readonly writeonly layout centroid flat
-    smooth noperspective patch sample break continue do for while switch case default if else subroutine in out inout
-    float double int void bool true false invariant precise discard return mat2 mat3 mat4 vec2 vec3 vec4 ivec2 ivec3
-    ivec4 bvec2 bvec3 bvec4 uint uvec2 uvec3 uvec4 lowp mediump highp precision struct common partition active asm class
-    union enum typedef template this resource goto inline noinline public static extern external interface long short
-    half fixed unsigned superp input output hvec2 hvec3 hvec4 fvec2 fvec3 fvec4 sampler3DRect filter sizeof cast
-    namespace using texture sampler2D sampler3D samplerCube image2D abs acos all any asin atan ceil clamp cos cross
-    degrees determinant distance dot equal exp exp2 floor fma fract inverse inversesqrt length log log2 main max min mix
-    mod modf normalize not pow radians reflect refract round sign sin smoothstep sqrt step tan transpose trunc camera
-    world_position linear_depth is_nothing nearer view_dir packed row_major atomic_uint dvec2 dvec3 dvec4 dmat2 dmat3
-    dmat4 mat2x2 mat2x3 mat2x4 mat3x2 mat3x3 mat3x4 mat4x2 mat4x3 mat4x4 dmat2x2 dmat2x3 dmat2x4 dmat3x2 dmat3x3 dmat3x4
-    dmat4x2 dmat4x3 dmat4x4
-    """.split()  # noqa: SIM905 - a list of so many words reads best as text
-    )
-    | _OF_THE_BASE
-)
-
-
+RESERVED_NAMES = _OF_THE_BASE | {*Path(__file__).with_name("reserved_names.txt").read_text(encoding="ascii").split()}
+"""Words that cannot be a GLSL identifier, that hide a built-in function used often, or that the base class owns."""
 _OF_THE_FRAMEWORK = frozenset(
     """
     ALPHA_BLEND ALPHA_MASK ANISOTROPIC DEFAULT_SPECULAR DOUBLE_SIDED HAS_TANGENT HAS_UV0 HAS_UV1 HAS_UV_TRANSFORM
     HAS_VERTEX_COLOR LIGHT_COUNT LIGHT_DIRECTIONALS LIGHT_POINTS LIGHT_SPOTS LIGHT_STORAGE MATERIAL_COUNT
     MATERIAL_STORAGE MATERIAL_UV_STORAGE NO_EMISSIVE PASS_VIEW PASS_VIEW_COUNT SHADOW_LIGHT_COUNT UNIFORM_SCALE UNLIT
-    """.split()  # noqa: SIM905 - as above
+    """.split()  # noqa: SIM905 - a list of so many words reads best as text
 )
 """Macros that shaders are given whatever the node declares."""
 _ROLES = "param(…), define(…) or structural(…)"

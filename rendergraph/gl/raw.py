@@ -7,92 +7,16 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 _TYPES: dict[str, Any] = {
     "v": None, "u": ctypes.c_uint, "i": ctypes.c_int, "f": ctypes.c_float, "d": ctypes.c_double, "b": ctypes.c_ubyte,
     "q": ctypes.c_uint64, "s": ctypes.c_ssize_t, "p": ctypes.c_void_p,
 }  # fmt: skip
-_FUNCTIONS = {
-    "v": "glPauseTransformFeedback glResumeTransformFeedback glEndConditionalRender",
-    "vb": "glDepthMask",
-    "vf": "glLineWidth",
-    "vu": """
-        glGenerateTextureMipmap glActiveTexture glEnable glDisable glProvokingVertex glDepthFunc glCullFace
-        glFrontFace glUseProgram glBindVertexArray glMemoryBarrier glEndQuery glDeleteProgram glDeleteShader
-    """,
-    "vdd": "glDepthBoundsEXT",
-    "vff": "glPolygonOffset",
-    "vip": """
-        glGenTextures glDeleteTextures glCreateMemoryObjectsEXT glDeleteMemoryObjectsEXT glCreateSamplers
-        glDeleteSamplers glCreateFramebuffers glDeleteFramebuffers glDeleteQueries
-    """,
-    "vui": "glPointParameteri glPixelStorei",
-    "vup": "glGetIntegerv glGetDoublev",
-    "vuu": """
-        glBindTexture glBindTextureUnit glBindSampler glEnablei glDisablei glBlendEquationi glClipControl glHint
-        glPolygonMode glStencilMaskSeparate glBindFramebuffer glBindRenderbuffer glBindTransformFeedback
-        glBeginConditionalRender glBindBuffer glBeginQuery
-    """,
-    "vudd": "glDepthRangeIndexed",
-    "vuii": "glProgramUniform1i",
-    "vuip": "glCreateTextures glBindTextures glBindSamplers glCreateQueries",
-    "vuui": "glTextureParameteri glSamplerParameteri",
-    "vuup": """
-        glGetUnsignedBytei_vEXT glSamplerParameterfv glGetProgramiv glGetQueryObjectui64v glGetQueryiv
-        glGetIntegeri_v glGetInteger64i_v glGetDoublei_v glGetMultisamplefv
-    """,
-    "vuuu": "glShaderStorageBlockBinding glUniformBlockBinding glBlendEquationSeparatei glBindBufferBase",
-    "vuiip": """
-        glProgramUniform1fv glProgramUniform2fv glProgramUniform3fv glProgramUniform4fv glProgramUniform1iv
-        glProgramUniform2iv glProgramUniform3iv glProgramUniform4iv glProgramUniform1uiv glProgramUniform2uiv
-        glProgramUniform3uiv glProgramUniform4uiv
-    """,
-    "vuqui": "glImportMemoryFdEXT",
-    "vuuip": "glClearNamedFramebufferfv glClearNamedFramebufferuiv glClearNamedFramebufferiv",
-    "vuuiu": "glStencilFuncSeparate",
-    "vuuui": "glNamedFramebufferTexture",
-    "vuuup": "glGetProgramInterfaceiv",
-    "vuuuu": "glStencilOpSeparate",
-    "vubbbb": "glColorMaski",
-    "vuffff": "glViewportIndexedf",
-    "vuiibp": "glProgramUniformMatrix2fv glProgramUniformMatrix3fv glProgramUniformMatrix4fv",
-    "vuiiii": "glScissorIndexed",
-    "vuiuii": "glTextureStorage2D",
-    "vuuuii": "glNamedFramebufferTextureLayer",
-    "vuuuss": "glBindBufferRange",
-    "vussii": "glMultiDrawArraysIndirectCountARB",
-    "vuussii": "glMultiDrawElementsIndirectCountARB",
-    "vuuuup": "glClearNamedBufferData",
-    "vuuuuu": "glBlendFuncSeparatei",
-    "vuiuiib": "glTextureStorage2DMultisample",
-    "vuiuiii": "glTextureStorage3D",
-    "vuuuipp": "glGetProgramResourceName",
-    "vuiuiiib": "glTextureStorage3DMultisample",
-    "vuiuiiuq": "glTextureStorageMem2DEXT",
-    "vuuibiuu": "glBindImageTexture",
-    "vuiuiibuq": "glTextureStorageMem2DMultisampleEXT",
-    "vuiuiiiuq": "glTextureStorageMem3DEXT",
-    "vuuuipipp": "glGetProgramResourceiv",
-    "vuuuuuuuu": "glTextureView",
-    "vuiiiiiuup": "glTextureSubImage2D",
-    "vuiuiiibuq": "glTextureStorageMem3DMultisampleEXT",
-    "vuiiiiiiiuup": "glTextureSubImage3D glClearTexSubImage",
-    "vuiiiiiiiuuip": "glGetTextureSubImage",
-    "vuuiiiiiiiiuu": "glBlitNamedFramebuffer",
-    "vuuiiiiuuiiiiiii": "glCopyImageSubData",
-    "u": "glGetError glCreateProgram",
-    "bu": """
-        glIsEnabled glIsTexture glIsBuffer glIsFramebuffer glIsVertexArray glIsSampler glIsProgram glIsShader
-        glIsQuery glIsRenderbuffer
-    """,
-    "buu": "glIsEnabledi",
-    "uuu": "glCheckNamedFramebufferStatus",
-}
-"""Functions by the letters of their result and arguments."""
-
-PROTOTYPES = {name: signature for signature, names in _FUNCTIONS.items() for name in names.split()}
-
+_TABLE = Path(__file__).with_name("functions.txt").read_text(encoding="ascii")
+PROTOTYPES = {name: letters for letters, *names in map(str.split, _TABLE.splitlines()) for name in names}
+"""Functions with the letters of their result and arguments."""
 
 _ERRORS = {
     0x500: "INVALID_ENUM", 0x501: "INVALID_VALUE", 0x502: "INVALID_OPERATION", 0x503: "STACK_OVERFLOW",

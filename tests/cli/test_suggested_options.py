@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
+from rendergraph.cli import suggestions
 from rendergraph.cli.app import VERBS, verb
-from rendergraph.cli.suggestions import MEANINGS, NEEDLESS
 
 
 @pytest.mark.parametrize(
@@ -61,8 +63,9 @@ def test_an_unknown_option_is_answered_with_what_is_meant(cli: Any, typed: str, 
 
 def test_what_is_suggested_exists_and_no_word_stands_twice() -> None:
     known = {option for parameter in verb("run").params for option in parameter.opts}
-    for advice in MEANINGS:
+    table = yaml.safe_load(Path(suggestions.__file__).with_suffix(".yaml").read_text())
+    for advice in table["meanings"]:
         first, second, *_ = advice.split()
         assert first in known or second in (*VERBS, "--version"), advice
-    words = " ".join((*MEANINGS.values(), *NEEDLESS.values())).split()
+    words = " ".join((*table["meanings"].values(), *table["needless"].values())).split()
     assert sorted(set(words)) == sorted(words)
