@@ -348,45 +348,5 @@ def clip_polygon(polygon: Points, planes: Points) -> Points:
 
 
 def visible_part(view: ViewMatrices, box: npt.ArrayLike) -> Points:
-    """Points whose hull is the part of a box that a view sees, shape (n, 3); none where it sees nothing of it.
-
-    The box's faces cut by the frustum, and the frustum's edges cut by the box: together every corner of the
-    intersection, also for an infinite far plane.
-    """
-    box = np.asarray(box, np.float64)
-    planes = frustum_planes(view)
-    corners = box_corners(box)
-    found = [polygon for face in BOX_FACES if len(polygon := clip_polygon(corners[list(face)], planes))]
-    points = [*found, *_frustum_edges_inside(planes, box)]
-    return np.concatenate(points) if points else np.empty((0, 3))
-
-
-def _frustum_edges_inside(planes: Points, box: Points) -> list[Points]:
-    """Where the frustum's edges lie inside the box: their ends, cut to it."""
-    sides = box_planes(box)
-    middle, span = (box[0] + box[1]) / 2, float(np.linalg.norm(box[1] - box[0])) + 1e-9
-    first, second = np.triu_indices(len(planes), 1)
-    along = np.cross(planes[first, :3], planes[second, :3])
-    length = np.linalg.norm(along, axis=1)
-    cross = length >= 1e-9
-    first, second, along = first[cross], second[cross], along[cross] / length[cross, None]
-    systems = np.stack([planes[first, :3], planes[second, :3], along], axis=1)
-    origins = np.linalg.solve(
-        systems, np.column_stack([-planes[first, 3], -planes[second, 3], along @ middle])[..., None]
-    )
-    origins = origins[..., 0]
-    cutting = np.concatenate([planes, sides])
-    rates, starts = along @ cutting[:, :3].T, origins @ cutting[:, :3].T + cutting[:, 3]
-    own = np.arange(len(cutting)) == np.stack([first, second])[..., None]
-    beside = own.any(axis=0)
-    flat = (np.abs(rates) < 1e-12) | beside
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ends = -starts / rates
-    low = np.where((rates > 0) & ~flat, ends, -span).max(axis=1, initial=-span)
-    high = np.where((rates < 0) & ~flat, ends, span).min(axis=1, initial=span)
-    missed = (flat & ~beside & (starts < -1e-9)).any(axis=1)
-    inside = (low <= high) & ~missed
-    return [
-        np.stack([origin + way * begin, origin + way * end])
-        for origin, way, begin, end in zip(origins[inside], along[inside], low[inside], high[inside], strict=True)
-    ]
+    """Points whose hull is the part of a box that a view sees, shape (n, 3); none where it sees nothing of it."""
+    return region_corners(np.concatenate([frustum_planes(view), box_planes(box)]))
