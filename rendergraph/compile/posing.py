@@ -70,8 +70,7 @@ class Posing(Struct, eq=False):
             }
             parts.append(table.reshape(-1))
             begin, state = begin + table.size, state + 12 * joints + targets
-        if 4 * begin > device.limits["storage_block"]:
-            most = device.limits["storage_block"]
+        if 4 * begin > (most := device.limits["storage_block"]):
             text = f"the scene's animated meshes take {4 * begin} bytes, a storage block of this device holds {most}"
             raise RenderError(Problem("RG435", text))
         rest, held = device.ctx.buffer(np.concatenate(parts).tobytes()), device.ctx.buffer(reserve=4 * max(state, 1))
@@ -81,12 +80,11 @@ class Posing(Struct, eq=False):
 
     def update(self, poses: Mapping[int, Pose]) -> bool:
         """Move the vertices of meshes whose pose is another than before; return whether there are some."""
-        changed = {number: pose for number, pose in poses.items() if not pose.is_like(self.poses.get(number))}
+        changed = {n: p for n, p in poses.items() if n not in self.poses or p.values != self.poses[n].values}
         self.poses |= changed
         self.stale |= changed.keys()
         for number, pose in changed.items():
-            values = np.concatenate([pose.joints.reshape(-1), pose.weights]).astype(np.float32)
-            self.state.write(values.tobytes(), offset=4 * self.uniforms[number]["mesh"][3])
+            self.state.write(pose.values, offset=4 * self.uniforms[number]["mesh"][3])
         self._dispatch(changed)
         return bool(changed)
 
@@ -121,8 +119,7 @@ class Posing(Struct, eq=False):
         if not meshes:
             return
         program = self._program = self._program or self._compiled()
-        buffers = [self.rest, self.state, *self.streams.values()]
-        for point, buffer in enumerate(buffers):
+        for point, buffer in enumerate((self.rest, self.state, *self.streams.values())):
             buffer.bind_to_storage_buffer(point)
         if self.vertices is not None:
             self.vertices[0].bind_to_storage_buffer(5)

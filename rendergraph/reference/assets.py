@@ -54,6 +54,7 @@ def describe_pipeline(name: str, linked: Linked) -> dict[str, Any]:
 
 def describe_scene(name: str, path: Path, scene: Scene) -> dict[str, Any]:
     from rendergraph.scene.animate import complete, moves  # other topics need no scene
+    from rendergraph.scene.gltf import used_extensions  # likewise
 
     triangles = [mesh.indices.size // 3 for mesh in scene.meshes]
     added = [] if scene.cameras else ["It has no camera: one is added in front, above and to the right."]
@@ -78,21 +79,12 @@ def describe_scene(name: str, path: Path, scene: Scene) -> dict[str, Any]:
             {"name": clip.name, "seconds": round(clip.length, 3)} for rig in scene.rigs for clip in rig.clips.values()
         ],
         "materials": [{"name": one.name, "line": _material(one)} for one in scene.materials],
-        "extensions": _extensions(path),
+        "extensions": used_extensions(path) if path.suffix.lower() in (".gltf", ".glb") else [],
         "lights": [{"name": light.name, "line": _light(light)} for light in scene.lights],
         "cameras": [{"name": name, "line": _camera(camera)} for name, camera in scene.cameras.items()],
         "added": added,
         "moves": moves(scene),
     }
-
-
-def _extensions(path: Path) -> list[str]:
-    """The extensions that a glTF file uses."""
-    if path.suffix.lower() not in (".gltf", ".glb"):
-        return []
-    from rendergraph.scene.gltf import used_extensions  # for such files alone
-
-    return used_extensions(path.read_bytes())
 
 
 def _material(material: Material) -> str:

@@ -43,8 +43,8 @@ class Deform(Struct, frozen=True, eq=False, dict=True):
         return Deform(rest, targets, self.joints[vertices], self.weights[vertices])
 
     @cached_property
-    def joint_boxes(self) -> tuple[Ints, Doubles, Doubles]:
-        """Joints that move some vertex, (u,), and the box of what each of them moves, (u, 3) twice; one without any."""
+    def _boxes(self) -> tuple[Ints, Doubles, Doubles, Doubles, Doubles]:
+        """Joints that move some vertex, (u,), the box of what each moves, and what each target adds, (u or t, 3)."""
         positions, joints, weights = self.rest["positions"].astype(np.float64), self.joints, self.weights
         if not joints.shape[1]:
             joints, weights = np.zeros((len(positions), 1), np.int32), np.ones((len(positions), 1), np.float32)
@@ -53,32 +53,25 @@ class Deform(Struct, frozen=True, eq=False, dict=True):
         for joint, weight in zip(joints.T, weights.T, strict=True):
             np.minimum.at(low, joint[weight > 0], positions[weight > 0])
             np.maximum.at(high, joint[weight > 0], positions[weight > 0])
-        used = np.flatnonzero(low[:, 0] <= high[:, 0]).astype(np.int32)
-        return used, low[used], high[used]
-
-    @cached_property
-    def target_boxes(self) -> tuple[Doubles, Doubles]:
-        """Least and greatest displacements of the targets, (t, 3) each."""
-        deltas = self.targets["positions"].astype(np.float64)
-        return deltas.min(axis=1), deltas.max(axis=1)
+        used, deltas = np.flatnonzero(low[:, 0] <= high[:, 0]).astype(np.int32), self.targets["positions"]
+        return used, low[used], high[used], deltas.min(axis=1).astype(float), deltas.max(axis=1).astype(float)
 
     def pose(self, joints: Doubles, weights: Doubles) -> Pose:
         """Return a pose with its box. A vertex is a mean of where each joint has it, so it lies in their hull."""
-        used, low, high = self.joint_boxes
-        least, most = self.target_boxes
+        used, low, high, least, most = self._boxes
         center = (low + high) / 2 + weights @ ((least + most) / 2)
         extent = (high - low) / 2 + np.abs(weights) @ ((most - least) / 2)
         size = np.abs(center) + extent
         if len(joints):
             linear, offset = joints[used, :, :3], joints[used, :, 3]
             center = np.einsum("jik,jk->ji", linear, center) + offset
-            extent = np.einsum("jik,jk->ji", np.abs(linear), extent)
-            size = np.einsum("jik,jk->ji", np.abs(linear), size) + np.abs(offset)
+            extent, size = (np.einsum("jik,jk->ji", np.abs(linear), each) for each in (extent, size))
+            size += np.abs(offset)
         extent = extent + _BOX_SLACK * size
         return Pose(self, joints, weights, ((center - extent).min(axis=0), (center + extent).max(axis=0)))
 
 
-class Pose(Struct, frozen=True, eq=False):
+class Pose(Struct, frozen=True, eq=False, dict=True):
     """What moves the vertices of one mesh at a moment; all objects of the mesh have the same.
 
     Attributes:
@@ -93,10 +86,10 @@ class Pose(Struct, frozen=True, eq=False):
     weights: Doubles
     box: tuple[Doubles, Doubles]
 
-    def is_like(self, other: Pose | None) -> bool:
-        return other is not None and all(
-            map(np.array_equal, (self.joints, self.weights), (other.joints, other.weights))
-        )
+    @cached_property
+    def values(self) -> bytes:
+        """Joints and weights as the GPU has them; what is equal draws the same."""
+        return np.concatenate([self.joints.reshape(-1), self.weights]).astype(np.float32).tobytes()
 
     def vertices(self) -> dict[str, Floats]:
         """Return the posed streams of `Deform.rest`, worked out in float64."""
@@ -107,9 +100,7 @@ class Pose(Struct, frozen=True, eq=False):
             weights = self.deform.weights.astype(np.float64)
             blended = np.einsum("nk,nkij->nij", weights, self.joints[self.deform.joints])
             linear = blended[:, :, :3]
-            rows = [
-                np.cross(linear[:, (i + 1) % 3], linear[:, (i + 2) % 3]) for i in range(3)
-            ]  # of the cofactor matrix
+            rows = [np.cross(linear[:, i - 2], linear[:, i - 1]) for i in range(3)]  # of the cofactor matrix
             sign = np.sign((linear[:, 0] * rows[0]).sum(axis=1))
             found["normals"] = np.stack([(row * found["normals"]).sum(axis=1) * sign for row in rows], axis=1)
             for name in ("positions", "tangents") & found.keys():
@@ -186,17 +177,11 @@ class Playback(Struct, frozen=True):
 
 
 class Part(Struct, frozen=True, eq=False):
-    """How an object of a file follows its nodes.
-
-    Attributes:
-        node: of which it is a part.
-        local: its transform inside the node, (4, 4).
-        skin: the skin that moves it in place of the node; -1 without.
-    """
+    """An object of a file: its node, its transform inside that, (4, 4), and the skin that moves it instead, or -1."""
 
     node: int
     local: Doubles
-    skin: int = -1
+    skin: int
 
 
 class Skin(Struct, frozen=True, eq=False):
@@ -211,7 +196,7 @@ class Rig(Struct, frozen=True, eq=False, dict=True):
 
     Attributes:
         parents: (n,), -1 for roots.
-        translations, rotations, scales: (n, 3), (n, 4), (n, 3), of the nodes at rest.
+        rest: `translation`, `rotation` and `scale` of the nodes at rest, (n, 3), (n, 4) and (n, 3).
         matrices: by node its transform where it is given as a matrix, which nothing animates.
         weights: by node those of its morph targets at rest.
         objects, lights, cameras: what the file's placements consist of, in their order: parts, nodes and nodes.
@@ -220,9 +205,7 @@ class Rig(Struct, frozen=True, eq=False, dict=True):
     """
 
     parents: Ints
-    translations: Doubles
-    rotations: Doubles
-    scales: Doubles
+    rest: Mapping[str, Doubles]
     matrices: Mapping[int, Doubles]
     weights: Mapping[int, Doubles]
     skins: tuple[Skin, ...]
@@ -244,10 +227,7 @@ class Rig(Struct, frozen=True, eq=False, dict=True):
 
         That is its transform in the file, those of its joints, (j, 3, 4), and the weights of its targets, (t,).
         """
-        streams = {
-            "translation": self.translations.copy(), "rotation": self.rotations.copy(), "scale": self.scales.copy()
-        }  # fmt: skip
-        weights = dict(self.weights)
+        streams, weights = {name: values.copy() for name, values in self.rest.items()}, dict(self.weights)
         moment = self.playback.start + self.playback.speed * time
         if self.clip is not None and self.clip.length:
             moment %= self.clip.length
@@ -256,7 +236,7 @@ class Rig(Struct, frozen=True, eq=False, dict=True):
                 weights |= dict(zip(track.nodes.tolist(), track.at(moment), strict=True))
             else:
                 streams[track.path][track.nodes] = track.at(moment)
-        worlds = placements(**{f"{name}s": values for name, values in streams.items()})
+        worlds = placements(*streams.values())
         for node, matrix in self.matrices.items():
             worlds[node] = matrix
         with np.errstate(over="ignore", invalid="ignore"):
@@ -264,14 +244,9 @@ class Rig(Struct, frozen=True, eq=False, dict=True):
                 worlds[level] = worlds[self.parents[level]] @ worlds[level]
         # Of an object without a skin -1 finds the last entry: no joints.
         skins = [*((worlds[skin.joints] @ skin.inverse_binds)[:, :3] for skin in self.skins), np.zeros((0, 3, 4))]
-        return worlds, [
-            (
-                part.local if part.skin >= 0 else worlds[part.node] @ part.local,
-                skins[part.skin],
-                weights.get(part.node, np.zeros(0)),
-            )
-            for part in self.objects
-        ]
+        at = [one.local if one.skin >= 0 else worlds[one.node] @ one.local for one in self.objects]
+        nodes = ((skins[one.skin], weights.get(one.node, np.zeros(0))) for one in self.objects)
+        return worlds, [(local, *state) for local, state in zip(at, nodes, strict=True)]
 
     @cached_property
     def _levels(self) -> list[npt.NDArray[np.int64]]:

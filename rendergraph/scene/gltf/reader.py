@@ -52,8 +52,9 @@ def read_gltf(path: Path, reading: Reading) -> Scene:
     return _Reader(schema.decode(data, reading), binary, path, reading).scene()
 
 
-def used_extensions(data: bytes) -> list[str]:
+def used_extensions(path: Path) -> list[str]:
     """Return the names of the extensions that a valid file uses."""
+    data = path.read_bytes()
     text = data[20 : 20 + int.from_bytes(data[12:16], "little")] if data[:4] == b"glTF" else data
     return [str(name) for name in json.loads(text).get("extensionsUsed", ())]
 
@@ -203,7 +204,7 @@ class _Reader:
         is_near = np.abs(worlds).max(axis=(1, 2), initial=0) <= FARTHEST
         names, objects, parts = UniqueNames(), list[Object](), list[Part]()
         lights: list[tuple[Light, int]] = []
-        cameras: dict[str, tuple[Camera, int]] = {}
+        cameras: list[tuple[Camera, int]] = []
         stack = roots[::-1]
         while stack:
             index = stack.pop()
@@ -213,9 +214,7 @@ class _Reader:
                 raise self._reading.error("RG306", text)
             stack += node.json.children[::-1]
             if node.json.mesh >= 0:
-                placed, followed = self._place(index, world, rig, names)
-                objects += placed
-                parts += followed
+                self._place(index, world, rig, names, objects, parts)
             if (light := node.json.extensions.light.light) >= 0:
                 axis, position = unit(-world[:3, 2]), vec3(world[:3, 3])
                 direction = vec3(axis) if axis.any() else (0.0, 0.0, -1.0)
@@ -223,7 +222,7 @@ class _Reader:
                 lights.append((moved, index))
             if node.json.camera >= 0:
                 camera = self._cameras[node.json.camera]
-                cameras[node.name] = replace(camera, name=node.name, transform=rigid(world)), index
+                cameras.append((replace(camera, name=node.name, transform=rigid(world)), index))
         scene = Scene(
             self._path.stem,
             self._path,
@@ -231,17 +230,17 @@ class _Reader:
             tuple(self._posed),
             tuple(self._placed_materials),
             tuple(light for light, _ in lights),
-            {name: camera for name, (camera, _) in cameras.items()},
+            {camera.name: camera for camera, _ in cameras},
         )
         if not rig.clips and all(mesh.deform is None for mesh in scene.meshes):
             return scene
         placement = Placement(
             tuple((number, placed.transform) for number, placed in enumerate(objects)),
             tuple((number, worlds[node]) for number, (_, node) in enumerate(lights)),
-            tuple((name, worlds[node]) for name, (_, node) in cameras.items()),
+            tuple((camera.name, worlds[node]) for camera, node in cameras),
         )
-        hung = tuple(node for _, node in lights), tuple(node for _, node in cameras.values())
-        rig = replace(rig, objects=tuple(parts), lights=hung[0], cameras=hung[1])
+        hung = (tuple(node for _, node in each) for each in (lights, cameras))
+        rig = replace(rig, objects=tuple(parts), **dict(zip(("lights", "cameras"), hung, strict=True)))
         return replace(scene, rigs=(rig,), placements={"": placement})
 
     def _rig(self, parents: Sequence[int]) -> Rig:
@@ -261,20 +260,22 @@ class _Reader:
                 weights[number] = np.array(given, np.float64)
         return Rig(
             np.array(parents, np.int32),
-            np.array([node.translation or (0, 0, 0) for node in nodes], np.float64).reshape(-1, 3),
-            np.array([node.rotation or (0, 0, 0, 1) for node in nodes], np.float64).reshape(-1, 4),
-            np.array([node.scale or (1, 1, 1) for node in nodes], np.float64).reshape(-1, 3),
+            {
+                key: np.array([getattr(node, key) or rest for node in nodes], np.float64).reshape(-1, len(rest))
+                for key, rest in (("translation", (0, 0, 0)), ("rotation", (0, 0, 0, 1)), ("scale", (1, 1, 1)))
+            },
             {n: np.reshape(node.matrix, (4, 4)).T for n, node in enumerate(nodes) if node.matrix},
             weights,
             read_skins(self._gltf, self._buffers, self._reading),
             read_clips(self._gltf, self._buffers, self._reading, counts),
         )
 
-    def _place(self, index: int, world: Matrix, rig: Rig, names: UniqueNames) -> tuple[list[Object], list[Part]]:
-        """The objects of a node; adds the default material if one of them is the first to use it."""
+    def _place(
+        self, index: int, world: Matrix, rig: Rig, names: UniqueNames, objects: list[Object], parts: list[Part]
+    ) -> None:
+        """Add the objects of a node, and the default material if one of them is the first to use it."""
         node, default = self._nodes[index], len(self._materials.materials)
         is_instanced = node.json.extensions.instancing is not None
-        objects, parts = [], []
         for number, local in enumerate(node.instances):
             instance = f"{node.name}[{number}]" if is_instanced else node.name
             for k, (mesh, material) in enumerate(self._meshes[node.json.mesh]):
@@ -289,7 +290,6 @@ class _Reader:
                 transform, shadow = (world @ local if skin < 0 else local), not node.name.endswith("NS")
                 objects.append(Object(name, mesh, material, transform, shadow, node=node.name))
                 parts.append(Part(index, local, skin))
-        return objects, parts
 
     def _own_mesh(self, mesh: int, index: int, rig: Rig) -> int:
         """The mesh of a node: what its skin or its weights move needs vertices of its own."""
@@ -310,10 +310,7 @@ class _Reader:
         if key not in slots:
             made = replace(self._primitives.meshes[mesh], deform=deform if key else None)
             slots[key] = len(self._posed) if slots else mesh
-            if slots[key] == mesh:
-                self._posed[mesh] = made
-            else:
-                self._posed.append(made)
+            self._posed[slots[key] : slots[key] + 1] = [made]
         return slots[key]
 
     def _roots(self) -> tuple[list[int], list[int]]:
