@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import runpy
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +17,7 @@ import pytest
 import rendergraph as rg
 from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.errors import InputError
+from rendergraph.resources import folder
 from rendergraph.scene import animate, pack
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.load import load
@@ -772,3 +774,23 @@ def test_a_clip_without_length_warns_and_holds_still(tmp_path: Path) -> None:
     assert now is not None
     assert later is not None
     assert now.values == later.values
+
+
+def test_the_shipped_salamander_is_what_its_program_computes(tmp_path: Path) -> None:
+    """Every number of the file, up to rounding on other machines; its feet stand on the ground all the time."""
+    scenes = folder("rendergraph.pipelines") / "scenes"
+    made = runpy.run_path(str(scenes / "salamander.py"))
+    made["write"](tmp_path / "salamander.glb")
+    (shipped, again) = (load(path / "salamander.glb") for path in (scenes, tmp_path))
+    for name in ("positions", "normals", "colors", "indices"):
+        found, expected = (getattr(scene.meshes[0], name) for scene in (again, shipped))
+        np.testing.assert_allclose(found, expected, atol=1e-5)
+    for time in np.linspace(0, 1.2, 13):
+        poses = [animate.at(scene, float(time)).objects[0].pose for scene in (again, shipped)]
+        vertices = poses[0].vertices()["positions"]  # type: ignore[union-attr]
+        np.testing.assert_allclose(vertices, poses[1].vertices()["positions"], atol=1e-5)  # type: ignore[union-attr]
+        feet = [vertices[(vertices[:, 0] * side > 0.1)][:, 1].min() for side in (-1, 1)]
+        assert -0.012 < min(feet) < 0.012
+    mesh = shipped.meshes[0]
+    a, b, c = mesh.positions.astype(float)[mesh.indices].swapaxes(0, 1)
+    assert np.einsum("ni,ni->", a, np.cross(b, c)) > 0  # its faces look outwards
