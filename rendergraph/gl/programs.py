@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -199,53 +199,36 @@ def driver_message(error: Exception) -> tuple[str | None, str]:
 
 
 def outputs_of(program: Program) -> dict[str, str]:
-    raw, glo = program.device.raw, program.glo
-    found, kind = {}, (ctypes.c_int * 1)()
-    for index in range(_count(raw, glo, _OUTPUT)):
-        raw.glGetProgramResourceiv(glo, _OUTPUT, index, 1, (ctypes.c_uint * 1)(_TYPE), 1, None, kind)
-        found[_name(raw, glo, _OUTPUT, index).removesuffix("[0]")] = _VALUES[kind[0]][0]
-    return {name: glsl for name, glsl in found.items() if not name.startswith("gl_")}
+    found = _resources(program, _OUTPUT, _TYPE)
+    return {name.removesuffix("[0]"): _VALUES[kind][0] for name, (kind,) in found if not name.startswith("gl_")}
 
 
 def member_offsets(program: Program, block: str) -> dict[str, int]:
     """Return the byte offsets of the active members of a storage block, by their names as in `sparks[0].age`."""
-    raw, glo, found = program.device.raw, program.glo, {}
-    asked, values = (ctypes.c_uint * 2)(_BLOCK_INDEX, _OFFSET), (ctypes.c_int * 2)()
-    for index in range(_count(raw, glo, _BUFFER_VARIABLE)):
-        raw.glGetProgramResourceiv(glo, _BUFFER_VARIABLE, index, 2, asked, 2, None, values)
-        if values[0] == program.storage[block]:
-            found[_name(raw, glo, _BUFFER_VARIABLE, index)] = values[1]
-    return found
+    found = _resources(program, _BUFFER_VARIABLE, _BLOCK_INDEX, _OFFSET)
+    return {name: offset for name, (index, offset) in found if index == program.storage[block]}
 
 
 def _inspect(program: Program) -> None:
-    raw, glo = program.device.raw, program.glo
-    for interface, into in ((_UNIFORM_BLOCK, program.blocks), (_STORAGE_BLOCK, program.storage)):
-        for index in range(_count(raw, glo, interface)):
-            into[_name(raw, glo, interface, index)] = index
-    asked = (ctypes.c_uint * 1)(_BUFFER_DATA_SIZE)
-    least = (ctypes.c_int * 1)()
-    for name, index in program.storage.items():
-        raw.glGetProgramResourceiv(glo, _STORAGE_BLOCK, index, 1, ctypes.byref(asked), 1, None, ctypes.byref(least))
-        program.storage_bytes[name] = least[0]
-    properties = (ctypes.c_uint * 4)(_TYPE, _ARRAY_SIZE, _BLOCK_INDEX, _LOCATION)
-    values = (ctypes.c_int * 4)()
-    for index in range(_count(raw, glo, _UNIFORM)):
-        raw.glGetProgramResourceiv(glo, _UNIFORM, index, 4, ctypes.byref(properties), 4, None, ctypes.byref(values))
-        kind, size, block, location = values
-        if block != -1:
-            continue
-        name = _name(raw, glo, _UNIFORM, index).removesuffix("[0]")
-        program.uniforms[name] = Uniform(name, kind, size, location)
+    program.blocks |= {name: index for index, (name, _) in enumerate(_resources(program, _UNIFORM_BLOCK))}
+    for index, (name, (least,)) in enumerate(_resources(program, _STORAGE_BLOCK, _BUFFER_DATA_SIZE)):
+        program.storage[name], program.storage_bytes[name] = index, least
+    for name, (kind, size, block, location) in _resources(
+        program, _UNIFORM, _TYPE, _ARRAY_SIZE, _BLOCK_INDEX, _LOCATION
+    ):
+        if block == -1:
+            name = name.removesuffix("[0]")
+            program.uniforms[name] = Uniform(name, kind, size, location)
 
 
-def _count(raw: Any, glo: int, interface: int) -> int:
-    value = ctypes.c_int()
-    raw.glGetProgramInterfaceiv(glo, interface, _ACTIVE, ctypes.byref(value))
-    return value.value
-
-
-def _name(raw: Any, glo: int, interface: int, index: int) -> str:
-    buffer = ctypes.create_string_buffer(512)
-    raw.glGetProgramResourceName(glo, interface, index, 512, None, buffer)
-    return buffer.value.decode()
+def _resources(program: Program, interface: int, *properties: int) -> Iterator[tuple[str, list[int]]]:
+    """Yield the name and the properties of each active resource of an interface, by its index."""
+    raw, glo, number = program.device.raw, program.glo, len(properties)
+    count, name = ctypes.c_int(), ctypes.create_string_buffer(512)
+    raw.glGetProgramInterfaceiv(glo, interface, _ACTIVE, ctypes.byref(count))
+    asked, values = (ctypes.c_uint * number)(*properties), (ctypes.c_int * number)()
+    for index in range(count.value):
+        raw.glGetProgramResourceName(glo, interface, index, 512, None, name)
+        if properties:
+            raw.glGetProgramResourceiv(glo, interface, index, number, asked, number, None, values)
+        yield name.value.decode(), list(values)

@@ -252,19 +252,16 @@ def _units(raw: RawGL, count: int) -> Iterator[tuple[int, int, list[tuple[int, i
         yield unit, raw.integer(_SAMPLER_BINDING), bound
 
 
-def _images(raw: RawGL) -> Iterator[tuple[Any, ...]]:
+def _images(raw: RawGL) -> Iterator[tuple[int, ...]]:
     """Yield the arguments of `glBindImageTexture` for each image unit."""
-    value = ctypes.c_int()
     for unit in range(raw.integer(_IMAGE_UNITS)):
-        raw.glGetIntegeri_v(0x8F3A, unit, ctypes.byref(value))
-        if not value.value:
+        if raw.integer(0x8F3A, unit):
+            yield (
+                unit,
+                *(raw.integer(parameter, unit) for parameter in (0x8F3A, 0x8F3B, 0x8F3C, 0x8F3D, 0x8F3E, 0x906E)),
+            )
+        else:
             yield unit, 0, 0, 0, 0, 0x88B8, 0x8229  # READ_ONLY, R8: as a context begins
-            continue
-        found = []
-        for parameter in (0x8F3A, 0x8F3B, 0x8F3C, 0x8F3D, 0x8F3E, 0x906E):
-            raw.glGetIntegeri_v(parameter, unit, ctypes.byref(value))
-            found.append(value.value)
-        yield unit, *found
 
 
 def _blocks(raw: RawGL) -> Iterator[tuple[int, int, int, int, int]]:

@@ -8,8 +8,10 @@ definitions of a name the worst. Real shaders stay far below the limit.
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence, Set
+from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 from math import prod
 
@@ -216,17 +218,13 @@ def _worst(growths: Sequence[_Growth]) -> _Growth:
 
 def _sorted(needs: Mapping[str, Set[str]]) -> list[str]:
     """Return names after all that they need; names on cycles, and those that need them, are left out."""
-    needed_by: dict[str, list[str]] = {name: [] for name in needs}
-    missing = {name: len(others) for name, others in needs.items()}
-    for name, others in needs.items():
-        for other in others:
-            needed_by[other].append(name)
-    found = [name for name, count in missing.items() if count == 0]
-    for name in found:  # it grows meanwhile
-        for other in needed_by[name]:
-            missing[other] -= 1
-            if missing[other] == 0:
-                found.append(other)
+    sorter = TopologicalSorter(needs)
+    with contextlib.suppress(CycleError):  # it goes on as far as it can
+        sorter.prepare()
+    found: list[str] = []
+    while ready := sorter.get_ready():
+        found += ready
+        sorter.done(*ready)
     return found
 
 

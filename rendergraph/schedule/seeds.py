@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from heapq import heapify, heappop, heappush
 
-from rendergraph.schedule.model import Model
+from rendergraph.schedule.model import Model, depth_first
 
 
 def seeds(model: Model) -> Iterator[list[int]]:
@@ -47,22 +47,7 @@ def post_order(model: Model) -> list[int]:
         children[step], most, held = sequence(model.before[step])
         need[step] = max(most, held + model.born[step])
     roots, _, _ = sequence([step for step in range(count) if not model.after[step]])
-    order: list[int] = []
-    placed = bytearray(count)
-    for root in roots:
-        stack = [(root, iter(children[root]))]
-        placed[root] = 1
-        while stack:
-            step, waiting = stack[-1]
-            for child in waiting:
-                if not placed[child]:
-                    placed[child] = 1
-                    stack.append((child, iter(children[child])))
-                    break
-            else:
-                order.append(step)
-                stack.pop()
-    return order
+    return depth_first(roots, children.__getitem__)
 
 
 def list_schedule(model: Model, *, backwards: bool = False) -> list[int]:
