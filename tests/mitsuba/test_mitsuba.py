@@ -450,9 +450,9 @@ def test_the_path_tracer_agrees(session: rg.Session, shared: Path, scene: str, e
         return np.asarray((values * calm).reshape(size[1] // 8, 8, size[0] // 8, 8, 3).sum(axis=(1, 3)) / 64)
 
     difference, noise = blocks(ours - light), np.sqrt(blocks(variance) / 64)
-    allowed = noise + 0.004 * blocks(light) + 1e-6  # filters of half floats, and rounding
+    allowed = noise + 0.003 * blocks(light) + 1e-6  # llvmpipe decodes sRGB to 0.2 %
     assert np.mean(abs(difference) < 3 * allowed) > 0.97
-    assert abs(difference.mean()) < 0.004 * light.mean() + 4 * np.sqrt((noise**2).sum()) / noise.size
+    assert abs(difference.mean()) < 0.003 * light.mean() + 4 * np.sqrt((noise**2).sum()) / noise.size
 
 
 def test_comparisons_take_it_as_a_truth() -> None:
