@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from rendergraph.api import (
     ADD,
@@ -29,7 +29,7 @@ class Interreflection(DirectionalSampling):
     second node takes the `reflected` of the first as its `diffuse`, and continues its `radiance`.
     """
 
-    twin = None
+    twin: ClassVar[str | None] = "traced_interreflection"
 
     depth = Input(Depth, group="gbuffer", doc="Window depth; positions come from it and its view.")
     normal = Input(Normal, group="gbuffer", doc="Unit normal, world space.")

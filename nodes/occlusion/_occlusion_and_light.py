@@ -16,6 +16,8 @@ class OcclusionAndLight(Interreflection):
     light themselves, and that of the lighting node must be 0.
     """
 
+    twin = "traced_occlusion_and_light"
+
     occlusion = Output(
         Occlusion, format="r16", size="depth", doc="Ambient visibility: 1 open, 0 occluded; 1 for background."
     )
