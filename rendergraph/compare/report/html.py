@@ -19,6 +19,12 @@ from rendergraph.metrics import Encoding, Pixels
 SOFTWARE = "software rasteriser: not comparable to a GPU"
 
 
+def template(name: str, **words: str) -> str:
+    """Return a file beside this module with `@words@` filled in."""
+    text = Path(__file__).with_name(name).read_text(encoding="utf-8")
+    return re.sub(r"@(\w+)@", lambda found: words[found[1]], text)
+
+
 def software_note(software: bool) -> str:
     return f'<p class="software">Times on a {SOFTWARE}.</p>' if software else ""
 

@@ -16,6 +16,7 @@ from rendergraph.compare.report.html import (
     section,
     software_note,
     table,
+    template,
 )
 from rendergraph.compare.report.pictures import first_differences, sheet, signed_sheet, viewer
 from rendergraph.compare.report.scatter import Point, scatter_svg
@@ -24,7 +25,6 @@ from rendergraph.diagrams import lifetimes_svg
 from rendergraph.diff import diff, diff_svg, diff_text
 from rendergraph.formatting import format_bytes
 from rendergraph.metrics import description
-from rendergraph.resources import folder
 
 MOST_COLUMNS = 8
 """Maximum number of variants whose passes are compared side by side; of more, those on the front."""
@@ -125,30 +125,25 @@ def _times(comparison: Comparison, results: Sequence[Result], front: Sequence[Re
 
 
 def _page(title: str, note: str, comparison: Comparison, sections: Sequence[tuple[str, str]], command: str) -> str:
-    home = folder("rendergraph") / "compare" / "report"
-    style, script = ((home / f"page.{kind}").read_text(encoding="utf-8") for kind in ("css", "js"))
     width, height = comparison.size
     device = comparison.device
     facts = [comparison.scene, f"{width}×{height}", str(device.get("renderer", ""))]
     facts[1:1] = [f"camera {comparison.camera}"] if comparison.camera else []
-    notes = "".join(f"<p class=quiet>{escape(note)}.</p>" for note in comparison.notes)
+    quiet = "".join(f"<p class=quiet>{escape(note)}.</p>" for note in comparison.notes)
     repeat = f"<pre><code>{escape(command)}</code></pre>"
-    closing = section("again", "Command", repeat, notes, _folded("The machine", _machine(comparison)))
+    closing = section("again", "Command", repeat, quiet, _folded("The machine", _machine(comparison)))
     links, bodies = (list(filter(None, column)) for column in zip(*sections, closing, strict=True))
+    notes = [f'<p class="note">{escape(part.strip())}</p>\n' for part in note.split("\n\n") if part.strip()]
     # Nothing may be fetched: the page says so to the browser, which then holds it to that.
-    policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
-    return (
-        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f'<link rel="icon" href="data:,">\n'
-        f"<title>{escape(title)}</title>\n<style>\n{style}</style>\n</head>\n<body>\n<main>\n<header>\n"
-        f"<h1>{escape(title)}</h1>\n"
-        f'<p class="lead">{escape(" · ".join(fact for fact in facts if fact))}</p>\n'
-        + "".join(f'<p class="note">{escape(part.strip())}</p>\n' for part in note.split("\n\n") if part.strip())
-        + f'<nav aria-label="Sections">{"".join(links)}</nav>\n</header>\n'
-        + "\n".join(bodies)
-        + f"\n</main>\n<script>\n{script}</script>\n</body>\n</html>\n"
+    return template(
+        "page.html",
+        title=escape(title),
+        style=template("page.css"),
+        lead=escape(" · ".join(fact for fact in facts if fact)),
+        notes="".join(notes),
+        links="".join(links),
+        bodies="\n".join(bodies),
+        script=template("page.js"),
     )
 
 

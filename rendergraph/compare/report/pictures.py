@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
-from rendergraph.compare.report.html import eight_bit, number, png
+from rendergraph.compare.report.html import eight_bit, number, png, template
 from rendergraph.compare.results import Comparison
 from rendergraph.images import heat_map, signed_map, viewable
 
@@ -24,36 +24,7 @@ def viewer(comparison: Comparison) -> str:
             for place, (identity, label) in enumerate(pictures)
         )
 
-    modes = [("slide", "Slide", "s"), ("a", "A", "a"), ("b", "B", "b"), ("difference", "Difference", "d")]
-    buttons = "".join(
-        f'<button type="button" data-mode="{mode}" aria-pressed="{"true" if mode == "slide" else "false"}" '
-        f'aria-keyshortcuts="{key}" title="key {key}">{label}</button>'
-        for mode, label, key in modes
-    )
-    gains = "".join(f"<option{' selected' if gain == 8 else ''}>{gain}</option>" for gain in (1, 2, 4, 8, 16, 32, 64))
-    zooms = "".join(
-        f'<option value="{value}">{label}</option>'
-        for value, label in (("fit", "fit"), ("1", "1:1"), ("2", "2:1"), ("4", "4:1"), ("8", "8:1"))
-    )
-    return f"""<div class="viewer" role="group" aria-label="Two pictures against each other">
-<div class="controls">
-<label>A <select data-a aria-label="Picture A">{options(0)}</select></label>
-<label>B <select data-b aria-label="Picture B">{options(min(1, len(pictures) - 1))}</select></label>
-<span class="group" role="group" aria-label="What is shown">{buttons}</span>
-<label>times <select data-gain>{gains}</select></label>
-<label>zoom <select data-zoom>{zooms}</select></label>
-</div>
-<div class="stage" data-stage tabindex="0" hidden><div class="frame"><div class="pile" data-frame>
-<img data-under alt=""><img class="over" data-over alt=""><canvas data-canvas class="over" hidden></canvas>
-<span class="cut" data-cut></span><span class="tag left" data-left></span><span class="tag right" data-right></span>
-</div>
-<input class="slider" data-slider type="range" min="0" max="100" step="0.5" value="50"
- aria-label="Where A ends and B begins">
-</div></div>
-<div class="readout num" data-readout aria-hidden="true"></div>
-</div>
-<p class="quiet">Drag over the picture, or focus the slider and use the arrow keys. Keys: <kbd>s</kbd> slide,
-<kbd>a</kbd> and <kbd>b</kbd> one of them, <kbd>x</kbd> the other one, <kbd>d</kbd> the difference.</p>"""
+    return template("viewer.html", options_a=options(0), options_b=options(min(1, len(pictures) - 1))).rstrip("\n")
 
 
 def sheet(comparison: Comparison, most: int) -> str:
