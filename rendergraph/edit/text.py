@@ -24,7 +24,7 @@ DELETED: Any = object()
 
 BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")
 _COMMA = re.compile(r"(?:\s|(?<=\s)#[^\r\n]*+)*+,")
-_WIDTH = 100  # a new mapping that is longer than this is written in lines
+_WIDTH = 100  # a new mapping that is longer than this is written in lines, and so are the nodes of a file
 
 
 def edit(text: str, path: Path, value: Any) -> str:
@@ -209,7 +209,9 @@ def _insert(text: str, parent: Span, key: Any, value: Any) -> str:
 
 def _entry(key: Any, value: Any, indent: int) -> Iterator[str]:
     line = f"{text_of(key)}: {flow(from_plain(value, Source('')))}"
-    if isinstance(value, dict) and value and indent + len(line) > _WIDTH:
+    if not isinstance(value, dict) or not value:
+        yield line
+    elif indent + len(line) > _WIDTH or (indent == 0 and all(isinstance(child, dict) for child in value.values())):
         yield f"{text_of(key)}:"
         for name, child in value.items():
             yield from (f"  {inner}" for inner in _entry(name, child, indent + 2))

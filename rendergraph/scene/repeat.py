@@ -261,7 +261,7 @@ def _csv_columns(data: bytes, section: str, most: int) -> dict[str, Any]:
 
 def _arrays(data: bytes, most_bytes: int) -> dict[str, Any]:
     import zipfile  # for such files alone
-    import zlib
+    import zlib  # as zipfile
 
     broken = (ValueError, OSError, EOFError, KeyError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)
     try:

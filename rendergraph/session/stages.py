@@ -221,6 +221,8 @@ def draw(expanded: Expanded, gpu: Gpu, lead: int | None = None) -> Iterator[Fram
 
 def exposure_warnings(frame: Frame, linked: Linked) -> list[Problem]:
     """Return warnings about pictures that are almost black or mostly clipped, with what would help."""
+    if not frame.badly_exposed:
+        return []
     stops = [
         f"{node.id}.{name}"
         for node in linked.graph.nodes

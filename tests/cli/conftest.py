@@ -91,6 +91,7 @@ class FakeFrame:
         self.number = number
         self.warnings: tuple[Any, ...] = ()
         self.unsound: dict[str, Any] = {}
+        self.badly_exposed: dict[str, str] = {}
 
     def __getitem__(self, name: str) -> Any:
         return np.full((4, 6, 4), self.number / 10, np.float32)

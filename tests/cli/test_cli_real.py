@@ -15,7 +15,7 @@ import yaml
 
 from rendergraph import images
 from rendergraph.cli.app import VERBS
-from rendergraph.resources import folder
+from rendergraph.resources import folder, shipped_pipelines
 
 SMALL = ("--size", "64x36")
 QUICK = (*SMALL, "-s", "sun.resolution=128")
@@ -49,7 +49,11 @@ def test_the_examples_of_the_help_work(cli: Any, tmp_path: Path, verb: str) -> N
         assert cli("run", "forward", *SMALL, "-s", "shadows.taps=1", "-o", "hard.png").code == 0
     if verb == "check-node":
         assert cli("new-node", "vignette").code == cli("new-node", "grain", "--kind", "shader-only").code == 0
-    (tmp_path / "my.yaml").write_text("extends: forward\n")
+    text = f"extends: {'deferred' if verb == 'edit' else 'forward'}\n"
+    if verb == "upgrade":
+        text = shipped_pipelines()["forward"].read_text().replace("rendergraph: 1\n", "")
+    (tmp_path / "my.yaml").write_text(text)
+    (tmp_path / "fog.frag").write_text("#include <grain.glsl>\n")
     study = "sweep: 1\npipeline: forward\nsize: [64, 36]\naxes: {shadows.taps: [1, 3]}\n"
     (tmp_path / "study.yaml").write_text(study)
     found = [words for words in examples(cli, *filter(None, [verb])) if not has_no_end(words)]

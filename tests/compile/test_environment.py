@@ -190,7 +190,7 @@ def test_what_is_not_there_is_said(tmp_path: Path, name: str, code: str) -> None
 
 
 def test_sun_and_turbidity_go_with_the_sky(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="RG321 'turbidity' goes with `file: sky`"):
+    with pytest.raises(InputError, match="RG321 'turbidity' goes with a sky"):
         rg.load("forward", scene=lit(tmp_path, "environment: {file: studio, turbidity: 4}")).link()
 
 
