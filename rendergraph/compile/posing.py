@@ -34,7 +34,6 @@ class Posing(Struct, eq=False):
     """
 
     device: Device
-    packed: PackedScene
     streams: Mapping[str, moderngl.Buffer]
     rest: moderngl.Buffer
     state: moderngl.Buffer
@@ -53,15 +52,12 @@ class Posing(Struct, eq=False):
         begin = state = 0
         poses = {placed.mesh: placed.pose for placed in scene.objects if placed.pose is not None}
         for number, pose in poses.items():
-            record, deform = packed.meshes[number], scene.meshes[number].deform
-            assert deform is not None
-            deform = deform.at(packed.vertex_orders[number])
+            record, deform = packed.meshes[number], pose.deform.at(packed.vertex_orders[number])
             first, count = int(record["base_vertex"]), int(record["vertices"])
-            columns = [getattr(packed, name)[first : first + count] for name in _TARGET_STREAMS if name in streams]
-            columns += [deform.joints.astype(np.float32), deform.weights]
+            rest = [getattr(packed, name)[first : first + count] for name in streams]
             deltas = [deform.targets[name] for name in _TARGET_STREAMS if name in deform.targets]
-            columns.append(np.concatenate(deltas, axis=2).swapaxes(0, 1).reshape(count, -1))
-            table = np.concatenate(columns, axis=1)
+            moved = np.concatenate(deltas, axis=2).swapaxes(0, 1).reshape(count, -1)
+            table = np.concatenate([*rest, deform.joints.astype(np.float32), deform.weights, moved], axis=1)
             joints, targets = len(pose.joints), len(pose.weights)
             uniforms[number] = {
                 "mesh": (first, count, begin, state),
@@ -73,8 +69,8 @@ class Posing(Struct, eq=False):
         if 4 * begin > (most := device.limits["storage_block"]):
             text = f"the scene's animated meshes take {4 * begin} bytes, a storage block of this device holds {most}"
             raise RenderError(Problem("RG435", text))
-        rest, held = device.ctx.buffer(np.concatenate(parts).tobytes()), device.ctx.buffer(reserve=4 * max(state, 1))
-        made = cls(device, packed, streams, rest, held, uniforms)
+        buffers = device.ctx.buffer(np.concatenate(parts).tobytes()), device.ctx.buffer(reserve=4 * max(state, 1))
+        made = cls(device, streams, *buffers, uniforms)
         made.update(poses)
         return made
 
@@ -90,6 +86,7 @@ class Posing(Struct, eq=False):
 
     def fill(self, vertices: moderngl.Buffer, width: int) -> None:
         """From now on pose the vertices of the scene's data as well."""
+        self._program.release()
         self.vertices, self._program = (vertices, width), None
         self._dispatch(self.poses)
 

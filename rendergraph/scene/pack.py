@@ -123,7 +123,7 @@ def pack(scene: Scene) -> PackedScene:
         meshes=records,
         lights=pack_lights(scene.lights),
         environment=pack_environment(scene.environment),
-        vertex_orders={n: vertices[n] for n, mesh in enumerate(scene.meshes) if mesh.deform is not None},
+        vertex_orders={placed.mesh: vertices[placed.mesh] for placed in scene.objects if placed.pose is not None},
         **columns,
     )
 

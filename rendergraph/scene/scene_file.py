@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from msgspec import Struct
@@ -41,8 +41,10 @@ from rendergraph.scene.model import (
 )
 from rendergraph.scene.reading import Reading
 from rendergraph.scene.repeat import Copies, copies, count_of, read_columns
-from rendergraph.scene.rig import Playback, Rig
 from rendergraph.scene.shapes import SHAPES, ShapePart, build
+
+if TYPE_CHECKING:
+    from rendergraph.scene.rig import Playback, Rig
 
 _DEFAULT = Material("default", base_color=(0.8, 0.8, 0.8, 1.0))
 _SRGB = ("base_color", "emissive", "specular_color")
@@ -428,6 +430,8 @@ class _Reader:
             text = f"object '{shown(name)}': its file has {what}{suggestion(values.get('clip', ''), clips)}"
             self.validator.report(place.get("clip") or place, "RG322", text)
             return None
+        from rendergraph.scene.rig import Playback  # for animated files alone
+
         return Playback(**values)
 
     def _overrides(

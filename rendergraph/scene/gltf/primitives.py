@@ -21,6 +21,16 @@ _SIGNED = (5126, 5120, 5122)
 _QUANTIZED = (5126, 5120, 5121, 5122, 5123)
 _UNSIGNED = (5121, 5123, 5125)
 _READ = ("POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "TEXCOORD_1", "COLOR_0")
+_TYPES = {
+    "POSITION": (("VEC3",), (_FLOAT, _QUANTIZED)),
+    "NORMAL": (("VEC3",), (_FLOAT, _SIGNED)),
+    "TANGENT": (("VEC4",), (_FLOAT, _SIGNED)),
+    "TEXCOORD": (("VEC2",), (_SMALL, _QUANTIZED)),
+    "COLOR": (("VEC3", "VEC4"), (_SMALL, _SMALL)),
+    "JOINTS": (("VEC4",), ((5121, 5123), (5121, 5123))),
+    "WEIGHTS": (("VEC4",), (_SMALL, _SMALL)),
+}
+"""Element types of attributes, and their component types, without and with KHR_mesh_quantization."""
 _TARGETS = {"POSITION": "positions", "NORMAL": "normals", "TANGENT": "tangents"}
 _MODES = ("points", "lines", "line loops", "line strips", "triangles", "triangle strips", "triangle fans")
 
@@ -125,12 +135,6 @@ class Primitives:
             names = f"JOINTS_{number}", f"WEIGHTS_{number}"
             if missing := [name for name in names if name not in attributes]:
                 raise self._error(f"{where} has no {missing[0]}, which belongs to its other joints and weights")
-            uses = zip(names, ((5121, 5123), _SMALL), strict=True)
-            for name, components in uses:
-                is_weight = name == names[1]
-                self._buffers.check_use(
-                    attributes[name], f"{where}.{name}", ("VEC4",), components, normalized=is_weight
-                )
             joints.append(self._buffers.array(attributes[names[0]]).astype(np.int32))
             weights.append(self._buffers.floats(attributes[names[1]]).astype(np.float64))
         share, joint = np.concatenate(weights, axis=1), np.concatenate(joints, axis=1)
@@ -149,14 +153,12 @@ class Primitives:
         found: dict[str, Floats] = {"positions": np.zeros(shape, np.float32)}
         for number, target in enumerate(primitive.targets):
             for key, index in target.items():
-                use = f"{where}.targets[{number}].{key}"
+                use, stream = f"{where}.targets[{number}].{key}", _TARGETS.get(key)
                 accessor = self._buffers.accessor(index, use)
-                stream = _TARGETS.get(key)
                 if stream is None:
                     self._reading.warn("RG333", f"target {key}", f"{use}: morph targets of '{key}' are left out")
                     continue
-                components = _FLOAT if not self._quantized else _QUANTIZED if stream == "positions" else _SIGNED
-                self._buffers.check_use(index, use, ("VEC3",), components)
+                self._buffers.check_use(index, use, ("VEC3",), _TYPES[key][1][self._quantized])
                 if accessor.count != shape[1]:
                     raise self._error(f"{use} has {accessor.count} values, but the primitive {shape[1]} vertices")
                 values = self._buffers.floats(index)
@@ -168,20 +170,14 @@ class Primitives:
 
     def _attribute(self, key: str, number: int, where: str) -> Accessor:
         """The accessor of an attribute, whose type must be one of those that the attribute may have."""
-        quantized, use = self._quantized, f"{where}.{key}"
-        if key not in _READ and not key.startswith(("_", "JOINTS_", "WEIGHTS_")):
+        use, kind = f"{where}.{key}", key.partition("_")[0]
+        if key not in _READ and kind not in ("", "JOINTS", "WEIGHTS"):
             self._reading.warn("RG333", f"attribute {key}", f"{where}: attribute '{key}' is left out")
-        if key == "POSITION":
-            return self._buffers.check_use(number, use, ("VEC3",), _QUANTIZED if quantized else _FLOAT)
-        if key in ("NORMAL", "TANGENT"):
-            types = ("VEC3",) if key == "NORMAL" else ("VEC4",)
-            return self._buffers.check_use(number, use, types, _SIGNED if quantized else _FLOAT, normalized=True)
-        if key.startswith("TEXCOORD_"):
-            components = _QUANTIZED if quantized else _SMALL
-            return self._buffers.check_use(number, use, ("VEC2",), components, normalized=not quantized)
-        if key.startswith("COLOR_"):
-            return self._buffers.check_use(number, use, ("VEC3", "VEC4"), _SMALL, normalized=True)
-        return self._buffers.accessor(number, use)
+        if kind not in _TYPES:
+            return self._buffers.accessor(number, use)
+        types, components = _TYPES[kind]
+        normalized = kind not in ("POSITION", "JOINTS") and not (self._quantized and kind == "TEXCOORD")
+        return self._buffers.check_use(number, use, types, components[self._quantized], normalized)
 
     def _corners(self, where: str, indices: int, count: int) -> Indices:
         if indices < 0:
