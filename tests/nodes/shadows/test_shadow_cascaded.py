@@ -61,6 +61,7 @@ class Post:
     mesh: int = 0
     casts_shadow: bool = True
     hidden: bool = False
+    pose: None = None
 
 
 @dataclass(eq=False)
