@@ -191,8 +191,9 @@ def data_macros(scene: Scene, packed: PackedScene, arrays: TextureArrays) -> dic
     macros |= {f"SCENE_{slot.upper()}_ARRAYS": str(bits) for slot, bits in used.items() if bits}
     if any(map(scene.has_grain, scene.materials)):
         macros["SCENE_GRAIN"] = "1"
-    if "mask" in packed.alpha_mode:
-        macros["SCENE_ANY_MASKED"] = "1"
+    for mode, name in (("mask", "SCENE_ANY_MASKED"), ("blend", "SCENE_ANY_BLENDED")):
+        if mode in packed.alpha_mode:
+            macros[name] = "1"
     if packed.material_moved.any():
         macros["HAS_UV_TRANSFORM"] = "1"
     return macros

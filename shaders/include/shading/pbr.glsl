@@ -2,6 +2,55 @@
 #pragma needs(grain_where_any)
 #include <anisotropic_ggx.glsl>
 
+#ifdef SAMPLES_DIRECTIONS
+#include <sampled_directions.glsl>
+#define HAS_SAMPLED_DIRECTIONS
+
+vec2 ggx_alphas(Surface s) {
+    float alpha = max(s.roughness * s.roughness, 0.001);
+#ifdef NEEDS_GRAIN
+    return vec2(mix(alpha, 1.0, s.anisotropy * s.anisotropy), alpha);
+#else
+    return vec2(alpha);
+#endif
+}
+
+mat3 ggx_frame(Surface s) {
+#ifdef NEEDS_GRAIN
+    if (s.anisotropy > 0.0) return mat3(s.tangent, s.bitangent, s.normal);
+#endif
+    return tangent_frame_of(s.normal);
+}
+
+// Chance of the specular lobe.
+float specular_share(Surface s) {
+    float NoV = clamp(dot(s.normal, s.view_dir), 1e-4, 1.0);
+    return lobe_share(fresnel_schlick(s.f0, s.f90, NoV), s.diffuse);
+}
+
+vec3 sample_direction(Surface s, vec3 xi) {
+    mat3 frame = ggx_frame(s);
+    if (xi.z >= specular_share(s)) return frame * sample_cosine(xi.xy);
+    vec3 v = s.view_dir * frame;
+    v.z = max(v.z, 1e-4);
+    return reflect(-s.view_dir, frame * sample_visible_normal(normalize(v), ggx_alphas(s), xi.xy));
+}
+
+float direction_density(Surface s, vec3 light_dir) {
+    mat3 frame = ggx_frame(s);
+    vec3 v = s.view_dir * frame, half_vector = normalize(light_dir + s.view_dir), h = half_vector * frame;
+    v.z = max(v.z, 1e-4);
+    vec2 alpha = ggx_alphas(s);
+    float share = specular_share(s), NoL = dot(s.normal, light_dir);
+    if (h.z <= 0.0 || dot(half_vector, s.view_dir) <= 0.0) return (1.0 - share) * max(NoL, 0.0) / PI;
+    float distribution = distribution_ggx(s.normal, half_vector, alpha.y);
+#ifdef NEEDS_GRAIN
+    if (s.anisotropy > 0.0) distribution = distribution_ggx_anisotropic(h.z, h.x, h.y, alpha.x, alpha.y);
+#endif
+    return share * distribution * visible_normal_density(normalize(v), alpha) + (1.0 - share) * max(NoL, 0.0) / PI;
+}
+#endif
+
 ReflectedLight shade(Surface s, vec3 light_dir) {
     float NoL = max(dot(s.normal, light_dir), 0.0);
     float NoV = max(dot(s.normal, s.view_dir), 1e-4);

@@ -1,0 +1,231 @@
+"""Path tracing."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from rendergraph.api import (
+    Albedo,
+    Depth,
+    EnvironmentLight,
+    Facts,
+    History,
+    Input,
+    Internal,
+    Luminance,
+    Node,
+    Normal,
+    Output,
+    Part,
+    Port,
+    Radiance,
+    SceneData,
+    Steps,
+    View,
+    define,
+    param,
+    structural,
+)
+from rendergraph.api import Any as AnyTexel
+
+Color = float | tuple[float, float, float]
+_TABLE = 512, 256  # directions of the environment to choose from
+_BATCH = 4  # paths whose random numbers depend on each other, so that they cover a pixel evenly
+_MOST_RAYS = 80  # of a pixel in one step: drivers limit how long a step takes, and llvmpipe how often its loops turn
+
+
+def _emitters(facts: Facts) -> int:
+    return 0 if facts.scene_data is None else facts.scene_data.emitters
+
+
+def _table_side(node: Any, facts: Facts) -> int:
+    """Return the side of a square with a texel for each emitting triangle, a power of two."""
+    side = 1
+    while side * side < _emitters(facts):
+        side *= 2
+    return side
+
+
+def _tree_size(width: int, height: int) -> tuple[int, int]:
+    """Return the size of the tree over a table: its first level, and the others beside it."""
+    return max(width // 2, 1) + max(width // 4, 1), max(height // 2, 1)
+
+
+class PathTraced(Node):
+    """Light the scene by following the paths of light: the truth that other techniques approximate.
+
+    It takes the place of a lighting node, and needs neither shadows nor occlusion nor interreflection: all of it
+    follows from rays. Its shading models, materials and lights are those of the other nodes. Each frame adds `samples`
+    paths to every pixel, for as long as neither the camera nor the scene nor a parameter changes, and `radiance` is the
+    mean of all of them. Its noise falls with the square root of their number; `variance` says how large it is.
+
+    Surfaces that emit light and the environment are sources like any other. Without an environment, light of the
+    constant radiance `ambient` comes from all sides. The camera does not see backs of materials with one side, as in
+    other nodes; for all other rays they are as their fronts, but emit no light. A shading model without sampled
+    directions of its own is sampled by the cosine, which finds narrow highlights late.
+
+    References: Kajiya 1986; Veach 1997 (multiple importance sampling); Heitz 2018 (visible normals); Burley 2020 (Owen
+    scrambling by hashes).
+    """
+
+    scene = Input(SceneData, rays=True, doc="The scene and its trees.")
+    view = Input(View, kind="view", optional=True, doc="The view; the pipeline's camera by default.")
+    environment = Input(
+        EnvironmentLight, kind="function", optional=True, doc="Light of the environment, which replaces `ambient`."
+    )
+    radiance = Output(
+        Radiance, format="rgba32f", doc="Mean of the scene-linear radiance of all paths; alpha is coverage."
+    )
+    variance = Output(Radiance, format="rgba32f", doc="Variance of this mean, of each channel.")
+    samples_taken = Output(Luminance, format="r32f", doc="Number of paths in the mean.")
+    albedo = Output(Albedo, format="rgba16f", clear=0.0, doc="Base colour of the first surface at the pixel's centre.")
+    normal = Output(Normal, format="rgba16_snorm", clear=0.0, doc="Its shading normal; 0 on the background.")
+    depth = Output(Depth, format="depth32f", clear=0.0, doc="Its window depth, 0 on the background.")
+    mean = History(format="rgba32f")
+    spread = History(format="rgba32f")
+    mean_between = Internal(format="rgba32f", doc="The mean between two steps of a frame.")
+    spread_between = Internal(format="rgba32f", doc="The spread between two steps.")
+    mean_before = Internal(format="rgba32f", doc="The mean before that.")
+    spread_before = Internal(format="rgba32f", doc="The spread before that.")
+    environment_table = Internal(
+        AnyTexel, format="r32f", size=_TABLE, mips=0, doc="Luminance of directions times their solid angle."
+    )
+    environment_tree = Internal(
+        AnyTexel, format="rgba32f", size=lambda node, facts: _tree_size(*_TABLE), doc="Tree to choose directions by."
+    )
+    emitter_tree = Internal(
+        AnyTexel,
+        format="rgba32f",
+        size=lambda node, facts: _tree_size(*(_table_side(node, facts),) * 2),
+        doc="Tree to choose emitting triangles by.",
+    )
+    emitter_table = Internal(
+        AnyTexel,
+        format="rgba32f",
+        size=lambda node, facts: (_table_side(node, facts),) * 2,
+        mips=0,
+        doc="Power of each emitting triangle.",
+    )
+    first_depth = Internal(Depth, format="depth32f", clear=0.0, doc="The depth if nobody reads it.")
+
+    shading: Literal["unlit", "phong", "blinn_phong", "anisotropic", "pbr"] | str = define(
+        default="pbr",
+        doc="Shading model: Cook-Torrance (`pbr`), always with its anisotropic formulas, or an empirical model.",
+        choices="shading",
+        needs=("nothing", "phong", "grain", "grain_where_any"),
+    )
+    smith: Literal["exact", "fast"] = define(
+        default="exact", doc="Visibility term of `pbr`: Smith, or a fit without square roots."
+    )
+    terms: Literal["all", "diffuse", "specular"] = define(
+        default="all", doc="Reflect light by all lobes of the materials, or by one kind alone."
+    )
+    ambient: Color = param(
+        default=0.03,
+        min=0,
+        glsl="vec3",
+        unless="environment",
+        doc="Constant radiance from all sides, a number or RGB; an environment replaces it.",
+    )
+    background: Color = param(default=0.0, min=0, glsl="vec3", doc="Radiance of the background, a number or RGB.")
+    backdrop: bool = structural(
+        default=True, doc="Show the environment behind all surfaces; otherwise there is the `background`."
+    )
+    samples: int = structural(default=16, min=1, max=65536, unit="paths", doc="Paths of a pixel in each frame.")
+    max_bounces: int = define(
+        default=4,
+        min=0,
+        max=64,
+        doc="Most reflections between the first and the last surface of a path; 0: direct light.",
+    )
+    light_part: Literal["all", "direct", "one_bounce", "indirect"] = define(
+        default="all",
+        doc="Show a part: `direct` is what is emitted or reflected once, `one_bounce` comes by way of one other "
+        "surface, `indirect` is all but direct light.",
+    )
+    sources: Literal["all", "lights", "environment", "emissive"] = define(
+        default="all", doc="Sources of light: punctual lights, the environment or `ambient`, emissive surfaces."
+    )
+    antialiasing: bool = define(
+        default=True, doc="Spread paths over the pixel. Without it all begin at its centre, as in other nodes."
+    )
+    seed: int = param(
+        default=0, min=0, doc="Of the random numbers. Pictures with different seeds have independent noise."
+    )
+
+    def record(self, steps: Steps) -> None:
+        """Record the tables to choose light from, the paths in several steps, and what follows from them."""
+        used: dict[str, Port] = {name: port for name, port in self.outputs().items() if steps.used(port)}
+        means = {name: port for name, port in used.items() if name in ("radiance", "variance", "samples_taken")}
+        if means:
+            self._trace_paths(steps, means)
+        first = {name: port for name, port in used.items() if name in ("albedo", "normal", "depth")}
+        if first:
+            first.setdefault("depth", self.first_depth)
+            steps.draw(
+                "first_hit.frag", vertex="<fullscreen.vert>", vertices=3, out=first, scene=self.scene, label="first hit"
+            )
+
+    def _trace_paths(self, steps: Steps, out: dict[str, Port]) -> None:
+        """Record the steps that add paths to the mean."""
+        reads: dict[str, Any] = {"scene": self.scene}
+        batch = _BATCH if self.samples % _BATCH == 0 else 1
+        defines: dict[str, Any] = {"BATCH": batch}
+        if steps.connected(self.environment):
+            reads |= {"environment": self.environment, "environment_table": self.environment_table}
+            reads["environment_tree"] = self.environment_tree
+            if self.backdrop and self.sources in ("all", "environment"):
+                defines["SHOWS_ENVIRONMENT"] = 1
+            steps.fullscreen(
+                "environment_table.frag",
+                environment=self.environment,
+                out=self.environment_table.mip(0),
+                defines={"ENVIRONMENT_TABLE_SIZE": "vec2({}, {})".format(*_TABLE)},
+                label="environment",
+            )
+            self._add_tree(steps, self.environment_table, self.environment_tree, 0)
+        emits = _emitters(steps.facts) > 0 and self.sources in ("all", "emissive")
+        if emits:
+            side = _table_side(self, steps.facts)
+            defines |= {"USES_EMITTERS": 1, "EMITTER_TABLE_SIDE": side}
+            reads |= {"emitter_table": self.emitter_table, "emitter_tree": self.emitter_tree}
+            steps.fullscreen(
+                "emitter_table.frag",
+                scene=self.scene,
+                out=self.emitter_table.mip(0),
+                defines={"EMITTER_TABLE_SIDE": side},
+                label="emitters",
+            )
+            self._add_tree(steps, self.emitter_table, self.emitter_tree, 3)
+        if emits or self.sources in ("all", "environment"):
+            defines["FOLLOWS_LAST"] = 1  # a ray from the last surface may find light by itself
+        at_once = max(batch, _MOST_RAYS // (self.max_bounces + 1) // batch * batch)
+        before: tuple[Port | Part, Port | Part] = self.mean.previous, self.spread.previous
+        between = [(self.mean_between, self.spread_between), (self.mean_before, self.spread_before)]
+        for number, first in enumerate(range(0, self.samples, at_once)):
+            paths = min(at_once, self.samples - first)
+            after = (self.mean, self.spread) if first + paths == self.samples else between[number % 2]
+            steps.draw(
+                "path_traced.frag",
+                vertex="<fullscreen.vert>",
+                vertices=3,
+                out={"mean": after[0], "spread": after[1]},
+                defines={**defines, "PATHS": paths},
+                label=f"paths {first + 1} to {first + paths}",
+                previous_mean=before[0],
+                previous_spread=before[1],
+                first_path=first,
+                **reads,
+            )
+            before = after
+        steps.fullscreen(
+            "path_outputs.frag", mean=self.mean, spread=self.spread, out=out, defines={"BATCH": batch}, label="mean"
+        )
+
+    def _add_tree(self, steps: Steps, table: Internal, tree: Internal, channel: int) -> None:
+        """Record the mips of a table, and the tree that texels are chosen by."""
+        if steps.desc(table).mips > 1:
+            steps.mipmaps(table)
+        steps.fullscreen(
+            "density_tree.frag", table=table, out={"tree": tree}, channel=channel, label=f"tree of {table.name}"
+        )

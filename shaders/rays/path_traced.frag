@@ -1,0 +1,154 @@
+// Path tracing: light of all sources that arrives by any number of reflections (J. Kajiya, "The Rendering Equation",
+// 1986). At each surface one source of light is chosen and tested for shadow, and the path goes on in a direction that
+// the material chooses. Light that both can find is weighted by the power heuristic (E. Veach, "Robust Monte Carlo
+// Methods for Light Transport Simulation", 1997).
+//
+// Each invocation follows the paths of its pixel one after the other in a single loop: one step is one ray and its
+// shadow ray, so that neighbours that run in lockstep are busy although their paths have different lengths.
+#define SAMPLES_DIRECTIONS
+#include <frame.glsl>
+#include "camera_ray.glsl"
+#include "path_ends.glsl"
+#include "path_sources.glsl"
+#include "path_visibility.glsl"
+
+uniform sampler2D previous_mean;
+uniform sampler2D previous_spread;
+uniform int seed;
+uniform int first_path;  // of this step within the frame
+out vec4 mean;           // radiance and coverage
+out vec4 spread;         // sum of squared differences of batches to the mean; number of batches
+
+void main() {
+    ivec2 texel = ivec2(gl_FragCoord.xy);
+    View view = PASS_VIEW;
+    bool continues = first_path > 0 || still_frames > 0;
+    mean = continues ? texelFetch(previous_mean, texel, 0) : vec4(0.0);
+    spread = continues ? texelFetch(previous_spread, texel, 0) : vec4(0.0);
+    uint pixel = hash(hash(uint(texel.x), uint(texel.y)), hash(uint(seed), uint(frame_index)));
+
+    vec4 batch = vec4(0.0);
+    int path = 0;        // of this pixel in this step
+    int vertex = -1;     // surfaces that the path has met; below 0 it has to begin
+    uint random = 0u;    // of the batch
+    uint ahead = 0u;     // surfaces that the ray has passed through
+    vec3 throughput = vec3(1.0), radiance = vec3(0.0), origin = vec3(0.0), direction = vec3(0.0, 0.0, 1.0);
+    float nearest = 0.0, farthest = 1e30, density = 0.0, coverage = 0.0;
+    vec3 chances = vec3(0.0);  // at the vertex before
+    while (path < PATHS) {
+        uint point = uint(path % BATCH);
+        if (vertex < 0) {
+            random = hash(pixel, uint(first_path + path - path % BATCH));
+#if ANTIALIASING
+            vec2 offset = sobol_point(point, random);
+#else
+            vec2 offset = vec2(0.5);
+#endif
+            CameraRay ray = camera_ray((vec2(texel) + offset) * view.viewport.zw);
+            origin = ray.origin;
+            direction = ray.direction;
+            nearest = ray.nearest;
+            farthest = ray.farthest;
+            throughput = vec3(1.0);
+            radiance = vec3(0.0);
+            coverage = 0.0;
+            density = 0.0;
+            vertex = 0;
+        }
+        uint dimension = random + uint(vertex) * 8u + ahead * 0x10000u;
+        bool ends = true;
+        Hit hit;
+        if (!trace(origin, direction, nearest, farthest, 0, 0, false, hit)) {
+            vec3 behind = light_behind(direction, vertex == 0, density, chances.y);
+            if (is_wanted(vertex - 1)) radiance += throughput * behind;
+        } else {
+            int flags = scene_instances[hit.instance].flags;
+            Surface s = scene_surface(hit.instance, hit.triangle, hit.barycentrics, -direction);
+            vec3 front = scene_geometric_normal(hit.instance, hit.triangle);
+            bool is_front = dot(front, direction) < 0.0, is_double_sided = (flags & SCENE_DOUBLE_SIDED) != 0;
+            // A back that geometry passes do not show is there for all rays but the camera's.
+            if (!is_front && !is_double_sided) s.normal = -s.normal;
+            bool passes = vertex == 0 && !is_front && !is_double_sided;
+#ifdef SCENE_ANY_MASKED
+            float cutoff = materials[MATERIAL_INDEX(scene_instances[hit.instance].material)].emissive.a;
+            float alpha = scene_alpha(hit.instance, hit.triangle, hit.barycentrics);
+            passes = passes || ((flags & SCENE_MASKED) != 0 && alpha < cutoff);
+#endif
+#ifdef SCENE_ANY_BLENDED
+            passes = passes || unit_float(hash(dimension, point + 77u)) >= s.alpha;
+#endif
+            if (passes) {
+                nearest = hit.distance;
+                ++ahead;
+                ends = false;
+            } else {
+                coverage = 1.0;
+#ifdef USES_EMISSION
+                bool is_unlit = s.lit == 0.0;
+#ifdef NEEDS_NOTHING
+                is_unlit = true;
+#endif
+                if (is_wanted(vertex - 1)) {
+                    if (is_unlit) {
+                        radiance += throughput * s.base_color;
+                    } else if (is_front || is_double_sided) {
+                        float weight = vertex > 0 ? emission_weight(hit, front, direction, density, chances.z) : 1.0;
+                        radiance += throughput * s.emissive * weight;
+                    }
+                }
+#else
+                bool is_unlit = s.lit == 0.0;
+#endif
+                if (!is_unlit && vertex <= LAST_VERTEX) {
+                    // One source of light and its shadow.
+                    vec2 choice = sobol_point(point, dimension + 0x100000u);
+                    float light_chance, lights_sum;
+                    int light = choose_light(s, choice.y, light_chance, lights_sum);
+                    chances = source_chances(s.position, lights_sum);
+                    vec3 start = offset_ray(s.position, s.geometric_normal);
+                    SourceSample source =
+                        sample_source(s, start, chances, choice.x, light, light_chance, point, dimension);
+                    vec3 arriving = source.reflected;
+                    bool reaches = dot(source.direction, s.geometric_normal) > 0.0 && is_wanted(vertex)
+                        && max(max(arriving.x, arriving.y), arriving.z) > 0.0;
+                    float passed = visibility(start, source.direction, reaches ? source.reach : 0.0, source.casting);
+                    if (reaches) radiance += throughput * arriving * passed;
+
+                    // The next ray.
+                    vec2 survival = sobol_point(point, dimension + 0x400000u);
+                    direction = sample_direction(s, vec3(sobol_point(point, dimension + 0x500000u), survival.x));
+                    density = direction_density(s, direction);
+                    bool goes_on = dot(direction, s.geometric_normal) > 0.0 && density > 0.0;
+                    throughput *= reflected(s, direction) * (SPREAD_LIGHT / max(density, 1e-37));
+                    float strongest = max(max(throughput.x, throughput.y), throughput.z);
+                    if (vertex >= 3) {  // Russian roulette
+                        float survives = min(strongest, 0.95);
+                        goes_on = goes_on && survival.y < survives;
+                        throughput /= max(survives, 1e-6);
+                    }
+                    goes_on = goes_on && strongest > 0.0;
+#ifndef FOLLOWS_LAST
+                    goes_on = goes_on && vertex < LAST_VERTEX;
+#endif
+                    if (goes_on) {
+                        origin = start;
+                        nearest = 0.0;
+                        farthest = 1e30;
+                        ++vertex;
+                        ends = false;
+                    }
+                }
+            }
+        }
+        if (ends) {
+            batch += vec4(radiance, coverage);
+            vertex = -1;
+            ahead = 0u;
+            ++path;
+            if (path % BATCH == 0) {
+                add_to_mean(batch / float(BATCH), mean, spread);
+                batch = vec4(0.0);
+            }
+        }
+    }
+}

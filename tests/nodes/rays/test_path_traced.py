@@ -1,0 +1,364 @@
+"""Path tracing: what it shows where the answer is known, how its noise falls, and whether it knows its noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import OpenImageIO as oiio
+import pytest
+
+import rendergraph as rg
+
+Image = npt.NDArray[np.float64]
+OUTPUTS = ("radiance", "variance", "samples_taken")
+
+
+def traced(
+    session: rg.Session,
+    scene: str | Path,
+    settings: dict[str, Any],
+    size: tuple[int, int] = (32, 18),
+    frames: int = 1,
+    environment: str | Path | None = None,
+) -> list[dict[str, Image]]:
+    """The outputs after each frame of a scene, which is a shipped one, a file or text, traced with these settings."""
+    given: dict[str, Any] = {} if environment is None else {"environment": environment}
+    pipeline = rg.load("path-traced", scene=scene, size=size, **given)
+    for name, value in settings.items():
+        pipeline = pipeline.set(name if "." in name else f"light.{name}", value)
+    shown = session.frames(pipeline, frames=range(1, frames + 1), warm_up=False, still=True)
+    return [{name: frame[name].astype(np.float64) for name in OUTPUTS} for frame in shown]
+
+
+def light(session: rg.Session, scene: str | Path, settings: dict[str, Any], **options: Any) -> Image:
+    image = traced(session, scene, settings, **options)[-1]["radiance"][..., :3]
+    assert np.isfinite(image).all()
+    return image
+
+
+def scene_file(folder: Path, text: str) -> Path:
+    file = folder / "scene.yaml"
+    file.write_text(f"scene: 1\n{text}")
+    return file
+
+
+def white_environment(folder: Path) -> Path:
+    """A picture of radiance 1 from all sides."""
+    file = folder / "white.exr"
+    image = oiio.ImageBuf(oiio.ImageSpec(32, 16, 3, "half"))
+    image.set_pixels(oiio.ROI(), np.ones((16, 32, 3), np.float32))
+    image.write(str(file))
+    return file
+
+
+# The furnace ---------------------------------------------------------------------------------------------------------
+
+
+def microfacets(roughness: float, angle: float, f0: float, grain: float = 0.0, along: float = 0.0) -> float:
+    """Directional albedo of the specular lobe in float64, from normals spread as GGX has them (Walter et al. 2007).
+
+    Args:
+        roughness: perceptual.
+        angle: between normal and viewer, radians.
+        f0: reflectance at normal incidence; 1 at grazing incidence.
+        grain: strength of the anisotropy.
+        along: angle between the tangent and the plane of incidence, radians.
+    """
+    b = max(roughness**2, 0.001)
+    t = b + (1 - b) * grain**2
+    u, w = np.meshgrid((np.arange(1500) + 0.5) / 1500, (np.arange(500) + 0.5) / 500)
+    phi = np.arctan2(b * np.sin(2 * np.pi * w), t * np.cos(2 * np.pi * w))
+    tan2 = u / (1 - u) / ((np.cos(phi) / t) ** 2 + (np.sin(phi) / b) ** 2)
+    cos_h = 1 / np.sqrt(1 + tan2)
+    sin_h = np.sqrt(1 - cos_h**2)
+    h = np.stack([sin_h * np.cos(phi), sin_h * np.sin(phi), cos_h])
+    v = np.array([np.sin(angle) * np.cos(along), np.sin(angle) * np.sin(along), np.cos(angle)])
+    VoH = np.einsum("i...,i", h, v)
+    x, y, NoL = 2 * VoH * h - v[:, None, None]
+    NoV = v[2]
+    masked = 0.5 / (
+        NoL * np.linalg.norm([t * v[0], b * v[1], NoV]) + NoV * np.sqrt((t * x) ** 2 + (b * y) ** 2 + NoL**2)
+    )
+    fresnel = f0 + (1 - f0) * (1 - np.clip(VoH, 0, 1)) ** 5
+    return float(np.where((NoL > 0) & (VoH > 0), fresnel * masked * 4 * NoL * VoH / cos_h, 0).mean())
+
+
+def phong_highlight(n: float) -> float:
+    """Of light from all sides over π, seen along the normal."""
+    return 2 / (n + 1)
+
+
+def blinn_highlight(n: float) -> float:
+    """Likewise, with the exponent 4 n."""
+    return 8 / (4 * n + 2) * (1 - 2 ** -(2 * n + 1))
+
+
+MATERIALS = {
+    "matte": "base_color: [0.6, 0.6, 0.6], roughness: 1, specular: 0",
+    "plastic": "base_color: [0.5, 0.5, 0.5], roughness: 0.3",
+    "metal": "base_color: [0.9, 0.9, 0.9], metallic: 1, roughness: 0.5",
+    "mirror": "base_color: [0.9, 0.9, 0.9], metallic: 1, roughness: 0",
+    "rough": "base_color: [0.9, 0.9, 0.9], metallic: 1, roughness: 1",
+    "brushed": "base_color: [0.9, 0.9, 0.9], metallic: 1, roughness: 0.4, anisotropy_strength: 0.7",
+}
+
+
+def furnace(
+    session: rg.Session, folder: Path, settings: dict[str, Any], degrees: float, samples: int, **options: Any
+) -> dict[str, float]:
+    """The mean radiance of a tile of each material, seen under an angle, with light of 1 from all sides."""
+    slope = np.radians(degrees)
+    eye = f"[0, {5 * np.cos(slope)}, {5 * np.sin(slope)}]"
+    text = f"cameras: {{main: {{height: 0.5, eye: {eye}, target: [0, 0, 0], up: [0, 0, -1]}}}}\n"
+    text += "lights: {none: {type: point, intensity: 0, at: [0, 9, 0]}}\nmaterials:\n"
+    text += "".join(f"  {name}: {{{values}}}\n" for name, values in MATERIALS.items())
+    text += "objects:\n"
+    for number, name in enumerate(MATERIALS):
+        text += f"  {name}: {{shape: plane, size: [0.98, 9], at: [{number - 2.5}, 0, 0], material: {name}}}\n"
+    given = {"max_bounces": 0, "samples": samples, "ambient": 1, "antialiasing": False, **settings}
+    image = light(session, scene_file(folder, text), given, size=(72, 6), **options)
+    assert abs(image - image[..., :1]).max() < 1e-5
+    # A tile is 12 pixels wide, of which the outer ones show its edge.
+    return {name: float(image[:, 12 * i + 1 : 12 * i + 11].mean()) for i, name in enumerate(MATERIALS)}
+
+
+def albedos(degrees: float) -> dict[str, float]:
+    angle = np.radians(degrees)
+    return {
+        "matte": 0.6,
+        "plastic": 0.5 + microfacets(0.3, angle, 0.04),
+        "metal": microfacets(0.5, angle, 0.9),
+        "mirror": microfacets(0.0, angle, 0.9),
+        "rough": microfacets(1.0, angle, 0.9),
+        "brushed": microfacets(0.4, angle, 0.9, 0.7, np.pi / 2),
+    }
+
+
+@pytest.mark.parametrize("degrees", [0, 60])
+def test_every_lobe_reflects_its_directional_albedo(session: rg.Session, tmp_path: Path, degrees: float) -> None:
+    found = furnace(session, tmp_path, {}, degrees, 256)
+    assert found == pytest.approx(albedos(degrees), rel=0.01)
+
+
+def test_the_environment_lights_like_constant_light_of_its_radiance(session: rg.Session, tmp_path: Path) -> None:
+    found = furnace(session, tmp_path, {}, 60, 256, environment=white_environment(tmp_path))
+    assert found == pytest.approx(albedos(60), rel=0.01)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("degrees", [0, 45, 75])
+@pytest.mark.parametrize("lit_by", ["ambient", "environment"])
+def test_every_lobe_reflects_its_albedo_within_three_per_mille(
+    session: rg.Session, tmp_path: Path, degrees: float, lit_by: str
+) -> None:
+    white = white_environment(tmp_path) if lit_by == "environment" else None
+    found = furnace(session, tmp_path, {}, degrees, 8192, environment=white)
+    assert found == pytest.approx(albedos(degrees), rel=0.003)
+
+
+@pytest.mark.parametrize(("model", "highlight"), [("phong", phong_highlight), ("blinn_phong", blinn_highlight)])
+def test_empirical_models_reflect_no_more_than_they_say(
+    session: rg.Session, tmp_path: Path, model: str, highlight: Any
+) -> None:
+    """Of the same material: kd is the base colour, ks 0.04, and n follows from the roughness."""
+    found = furnace(session, tmp_path, {"shading": model}, 0, 256)
+    alpha = 0.3**2
+    n = 0.5 / alpha**2 - 0.5
+    assert found["plastic"] == pytest.approx(0.5 + 0.04 * highlight(n), rel=0.01)
+
+
+# Emissive surfaces ---------------------------------------------------------------------------------------------------
+
+
+def corner_form_factor(a: float, b: float, height: float) -> float:
+    """Of a rectangle a by b that lies parallel over a point, one corner straight above it (Howell, B-3)."""
+    x, y = a / height, b / height
+    p, q = np.sqrt(1 + x * x), np.sqrt(1 + y * y)
+    return float((x / p * np.arctan(y / p) + y / q * np.arctan(x / q)) / (2 * np.pi))
+
+
+FLOOR = """
+cameras: {{main: {{eye: [0, 0.5, 0.02], target: [0, 0, 0], fov_y_degrees: 0.2, near: 0.01}}}}
+lights: {{none: {{type: point, intensity: 0, at: [0, 9, 0]}}}}
+materials:
+  grey: {{base_color: [0.5, 0.5, 0.5], specular: 0, roughness: 1}}
+  lamp: {{base_color: [0, 0, 0], specular: 0, emissive: [2, 4, 6]}}
+objects:
+  floor: {{shape: plane, size: [9, 9], material: grey}}
+  lamp: {lamp}
+"""
+
+
+@pytest.mark.parametrize(
+    ("lamp", "factor", "allowed"),
+    [
+        (
+            "{shape: plane, size: [0.6, 1], at: [0, 0.8, 0], rotate_degrees: [180, 0, 0], material: lamp}",
+            4 * corner_form_factor(0.3, 0.5, 0.8),
+            0.01,
+        ),
+        ("{shape: sphere, radius: 0.4, at: [0, 1.5, 0], material: lamp}", (0.4 / 1.5) ** 2, 0.015),
+    ],
+    ids=["rectangle", "sphere"],
+)
+def test_an_emissive_surface_lights_by_its_form_factor(
+    session: rg.Session, tmp_path: Path, lamp: str, factor: float, allowed: float
+) -> None:
+    settings = {"max_bounces": 0, "samples": 64, "ambient": 0, "sources": "emissive"}
+    image = light(session, scene_file(tmp_path, FLOOR.format(lamp=lamp)), settings, size=(16, 16))
+    assert image.mean(axis=(0, 1)) == pytest.approx(0.5 * factor * np.array([2, 4, 6]), rel=allowed)
+
+
+# Noise ---------------------------------------------------------------------------------------------------------------
+
+
+def noise(session: rg.Session, frames: int, seeds: Sequence[int] = (0, 1)) -> list[list[dict[str, Image]]]:
+    settings = {"samples": 4}
+    return [traced(session, "cornell_box", {**settings, "seed": seed}, size=(48, 27), frames=frames) for seed in seeds]
+
+
+@pytest.fixture(scope="module")
+def two_seeds(session: rg.Session) -> list[list[dict[str, Image]]]:
+    """48 frames of the Cornell box, twice."""
+    return noise(session, 48)
+
+
+def differences(two: list[list[dict[str, Image]]]) -> list[tuple[float, float]]:
+    """After each frame the mean squared difference of two pictures, and the sum of their variances."""
+    found = []
+    for one, other in zip(*two, strict=True):
+        square = (one["radiance"] - other["radiance"])[..., :3] ** 2
+        # The brightest pixels' noise would decide alone.
+        typical = np.argsort(square.sum(axis=-1).ravel())[: int(0.98 * square[..., 0].size)]
+        both = (one["variance"] + other["variance"])[..., :3]
+        found.append((float(square.reshape(-1, 3)[typical].mean()), float(both.mean())))
+    return found
+
+
+def test_noise_falls_with_the_square_root_of_the_samples(two_seeds: list[list[dict[str, Image]]]) -> None:
+    squares = [square for square, _ in differences(two_seeds)]
+    numbers = np.arange(1, len(squares) + 1)
+    slope = np.polyfit(np.log(numbers), 0.5 * np.log(squares), 1)[0]
+    assert slope == pytest.approx(-0.5, abs=0.05)
+
+
+def test_the_variance_is_that_of_the_mean(two_seeds: list[list[dict[str, Image]]]) -> None:
+    """The squared difference of two independent pictures is expected to be the sum of their variances."""
+    one, other = (frames[-1] for frames in two_seeds)
+    square = ((one["radiance"] - other["radiance"])[..., :3] ** 2).mean()
+    expected = (one["variance"] + other["variance"])[..., :3].mean()
+    assert square == pytest.approx(expected, rel=0.1)
+
+
+def test_pictures_of_two_seeds_agree(two_seeds: list[list[dict[str, Image]]]) -> None:
+    one, other = (frames[-1] for frames in two_seeds)
+    assert (one["radiance"] != other["radiance"]).any()
+    off = (one["radiance"] - other["radiance"])[..., :3]
+    error = np.sqrt((one["variance"] + other["variance"])[..., :3])
+    assert abs(off.mean()) < 3 * np.sqrt((error**2).sum()) / off.size
+    assert (abs(off) < 3 * error + 1e-9).mean() > 0.98
+
+
+def test_frames_add_samples_until_something_changes(session: rg.Session, tmp_path: Path) -> None:
+    still = traced(session, "cornell_box", {"samples": 20}, (8, 8), 3)
+    assert [frame["samples_taken"].mean() for frame in still] == [20, 40, 60]
+    moving = "objects: {one: {shape: box}}\nkeyframes: {objects.one.at: {0: [0, 0, 0], 1: [0, 1, 0]}}\n"
+    pipeline = rg.load("path-traced", scene=scene_file(tmp_path, moving), size=(8, 8))
+    frames = session.frames(pipeline, frames=range(1, 4), warm_up=False)
+    assert [frame["samples_taken"].mean() for frame in frames] == [16, 16, 16]
+
+
+# Parts ---------------------------------------------------------------------------------------------------------------
+
+
+def test_parts_and_sources_add_up(session: rg.Session) -> None:
+    """In the courtyard with its sun, sky and lanterns, by means of the whole picture."""
+    shared = {"samples": 16, "seed": 3}
+    whole = light(session, "courtyard", shared).mean(axis=(0, 1))
+    parts = [
+        light(session, "courtyard", {**shared, "light_part": part}).mean(axis=(0, 1)) for part in ("direct", "indirect")
+    ]
+    assert sum(parts) == pytest.approx(whole, rel=0.02)
+    names = ("lights", "environment", "emissive")
+    sources = [light(session, "courtyard", {**shared, "sources": name}).mean(axis=(0, 1)) for name in names]
+    assert sum(sources) == pytest.approx(whole, rel=0.02)
+    assert min(source.min() for source in sources) > 0.005
+
+
+def test_direct_light_of_a_lamp_is_that_of_a_shadow_volume(session: rg.Session) -> None:
+    """Another technique with exact shadows of a point light has the same light, and the same edges."""
+    own = light(session, "cornell_box", {"max_bounces": 0, "sources": "lights", "antialiasing": False}, size=(96, 54))
+    drawn = rg.load("shadow-volumes-auto", scene="cornell_box", size=(96, 54))
+    drawn = drawn.set("light.ambient", 0).set("light.terms", "diffuse")
+    diffuse = light(
+        session,
+        "cornell_box",
+        {"max_bounces": 0, "sources": "lights", "antialiasing": False, "terms": "diffuse"},
+        size=(96, 54),
+    )
+    other = session.render(drawn)["radiance"][..., :3]
+    assert (own >= diffuse - 1e-6).all()
+    close = np.abs(diffuse - other).max(axis=-1) < 0.01 * (0.05 + other.max(axis=-1))
+    assert close.mean() > 0.98
+
+
+def test_transparent_surfaces_mix_with_what_lies_behind(session: rg.Session, tmp_path: Path) -> None:
+    text = """
+cameras: {main: {eye: [0, 5, 0], target: [0, 0, 0], up: [0, 0, -1], fov_y_degrees: 10}}
+lights: {sun: {type: directional, direction: [0, -1, 0], intensity: 3.14159265}}
+materials:
+  white: {base_color: [0.8, 0.8, 0.8], specular: 0, roughness: 1}
+  glass: {base_color: [0, 1, 0, 0.25], specular: 0, roughness: 1, alpha_mode: blend}
+objects:
+  floor: {shape: plane, size: [9, 9], material: white}
+  pane: {shape: plane, size: [9, 9], at: [0, 1, 0], material: glass}
+"""
+    image = light(session, scene_file(tmp_path, text), {"max_bounces": 0, "samples": 1024, "ambient": 0}, size=(8, 8))
+    # A quarter of the pane, and three quarters of a floor on which three quarters of the light fall.
+    expected = 0.25 * np.array([0, 1, 0]) + 0.75 * 0.75 * 0.8
+    assert image.mean(axis=(0, 1)) == pytest.approx(expected, rel=0.01)
+
+
+# Reference -----------------------------------------------------------------------------------------------------------
+
+
+def reference(
+    session: rg.Session, shared: Path, part: str, name: str, bounces: int, frames: int
+) -> tuple[Image, Image, Image]:
+    """Light away from edges, its variance, and the reference data (tests of `ssgi` take the same)."""
+    here = shared / "reference" / "b4_gi" / "point"
+    surfaces = np.load(here / "gbuffer.npz")
+    judged = (surfaces["object"] > 0) & ~surfaces["edge"]
+    settings = {
+        "ambient": 0,
+        "light_part": part,
+        "max_bounces": bounces,
+        "antialiasing": False,
+        "terms": "diffuse",
+        "samples": 16 if frames > 1 else 8,
+    }
+    found = traced(session, here / "scene.glb", settings, (192, 192), frames, environment="none")[-1]
+    expected = np.asarray(oiio.ImageBuf(str(here / f"{name}.exr")).get_pixels(), np.float64)[..., :3]
+    return found["radiance"][..., :3][judged], found["variance"][..., :3][judged], expected[judged]
+
+
+def test_direct_light_is_that_of_the_reference(session: rg.Session, shared: Path) -> None:
+    found, variance, expected = reference(session, shared, "direct", "direct", 0, 1)
+    np.testing.assert_allclose(found, expected, rtol=0.01, atol=1e-4)
+    assert variance.max() < 1e-8
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(("part", "name", "bounces"), [("one_bounce", "one_bounce", 1), ("all", "full", 16)])
+def test_interreflection_is_that_of_the_reference(
+    session: rg.Session, shared: Path, part: str, name: str, bounces: int
+) -> None:
+    """The picture's mean and 99 % of its pixels lie within three standard errors; the reference has noise, too."""
+    found, variance, expected = reference(session, shared, part, name, bounces, 24)
+    own = np.sqrt(variance + (0.004 * expected) ** 2)
+    assert (np.abs(found - expected) < 3 * own).mean() > 0.985
+    assert abs((found - expected).mean()) < 3 * np.sqrt(variance.sum()) / variance.size + 2e-4 * expected.mean()
