@@ -45,7 +45,7 @@ def complete(scene: Scene, camera_name: str | None = None, aspect: float = WIDE,
 
 
 def moves(scene: Scene) -> bool:
-    return bool(scene.keyframes or scene.rigs) or scene.orbit is not None
+    return bool(scene.keyframes) or scene.orbit is not None or any(rig.length for rig in scene.rigs)
 
 
 def play(scene: Scene, playback: Playback | None) -> Scene:

@@ -15,6 +15,8 @@ import numpy.typing as npt
 import pytest
 
 import rendergraph as rg
+from rendergraph.api import Any as Anything
+from rendergraph.api import Input, Node, Output, SceneData, Steps
 from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.errors import InputError
 from rendergraph.resources import folder
@@ -591,6 +593,52 @@ def test_a_pose_draws_what_its_baked_mesh_draws(gl: rg.Session, stage: Path, nam
     assert (np.abs(found - expected).max(axis=-1) > 2).mean() < 0.002
 
 
+CORNER = """
+#include <previous_scene.glsl>
+out vec4 color;
+out vec4 before;
+void main() {
+    color = vec4(scene_position(1, 0, vec2(0.0)), 1.0);
+    before = vec4(scene_previous_position(1, 0, vec2(0.0)), 1.0);
+}
+"""
+KEPT_CORNER = CORNER.replace("#include <previous_scene.glsl>", "#include <scene.glsl>").replace("out vec4 before;", "")
+
+
+class Corner(Node):
+    """A corner of the worm's first triangle, now and a frame ago."""
+
+    scene = Input(SceneData, doc="Scene.")
+    color = Output(Anything, format="rgba32f", size=(1, 1), doc="World-space position.")
+    before = Output(Anything, format="rgba32f", size=(1, 1), doc="The same in the frame before.")
+    kept = Output(Anything, format="rgba32f", size=(1, 1), kept=True, doc="The position, kept while nothing moves.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("corner.frag", scene=self.scene, out={"color": self.color, "before": self.before})
+        if steps.used(self.kept):
+            steps.fullscreen("kept.frag", scene=self.scene, out={"color": self.kept})
+
+
+@pytest.mark.parametrize("speed", [1, 0])
+def test_steps_and_kept_values_run_again_where_the_pose_has_changed(bench: Any, stage: Path, speed: int) -> None:
+    text = "nodes: {a: {type: corner}}\noutputs: {image: a.color, before: a.before, kept: a.kept}\n"
+    kept = KEPT_CORNER[: KEPT_CORNER.index("    before")] + "}\n"
+    scene = STAGE.removeprefix("scene: 1\n").replace("animation: {}", f"animation: {{speed: {speed}, start: 0.1}}")
+    pipeline = bench.pipeline(text, Corner, shaders={"corner.frag": CORNER, "kept.frag": kept}, scene=scene)
+    options = {"frames": range(1, 5), "reuse": True, "timed": True, "warm_up": False}
+    frames = list(bench.session.frames(pipeline, outputs=["image", "before", "kept"], **options))
+    assert [frame.times[-1].ran for frame in frames] == ([2, 2, 2, 2] if speed else [2, 0, 0, 0])
+    now, before, kept_now = (np.array([f[name][0, 0, :3] for f in frames]) for name in ("image", "before", "kept"))
+    np.testing.assert_array_equal(kept_now, now)
+    np.testing.assert_array_equal(before, [now[0], *now[:-1]])
+    reference = Reference(stage.parent / "worm.gltf")
+    packed = pack.pack(pipeline.link().scene)
+    first = packed.vertex_orders[1][packed.indices[packed.meshes[1]["first_index"]]]
+    for number, found in enumerate(now):
+        position = reference.posed(0, 0, 0, 0.1 + speed * number / 30)[0][first] + [0, -1, 0]
+        assert np.abs(found - position).max() < 2e-5
+
+
 def light(picture: Any) -> Any:
     c = picture[..., :3] / 255
     return np.where(c > 0.04045, ((c + 0.055) / 1.055) ** 2.4, c / 12.92)
@@ -774,6 +822,7 @@ def test_a_clip_without_length_warns_and_holds_still(tmp_path: Path) -> None:
     assert now is not None
     assert later is not None
     assert now.values == later.values
+    assert not animate.moves(scene)
 
 
 def test_the_shipped_salamander_is_what_its_program_computes(tmp_path: Path) -> None:
