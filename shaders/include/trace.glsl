@@ -32,7 +32,8 @@ vec3 trace_permuted(vec3 v, int last) {
 //
 // The loops are nested so that the invocations that a processor runs in lockstep do the same work at a time. The stack
 // cannot overflow: depths of trees are limited when they are built, and TRACE_STACK follows from the limits.
-bool trace(vec3 origin, vec3 direction, float nearest, float farthest, int wanted, int rejected, bool any, out Hit hit) {
+bool trace(
+    vec3 origin, vec3 direction, float nearest, float farthest, int wanted, int rejected, bool any, out Hit hit) {
     int stack[TRACE_STACK];
     stack[0] = TRACE_END;
     int top = 1;
@@ -135,8 +136,8 @@ bool trace_is_cut_away(Hit hit) {
 }
 #endif
 
-// The nearest surface along a ray between two distances in lengths of the direction. It finds transparent surfaces, too,
-// but not what an alpha mask cuts away, and no hidden objects.
+// The nearest surface along a ray between two distances in lengths of the direction. It finds transparent surfaces,
+// too, but not what an alpha mask cuts away, and no hidden objects.
 bool nearest_hit(vec3 origin, vec3 direction, float nearest, float farthest, out Hit hit) {
     bool is_hit = trace(origin, direction, nearest, farthest, 0, 0, false, hit);
 #ifdef SCENE_ANY_MASKED

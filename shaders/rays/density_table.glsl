@@ -1,6 +1,6 @@
-// Sampling of texels in proportion to their values (M. McCool and P. Harwood, "Probability Trees", 1997): a point of the
-// unit square is warped level by level. `density_tree.frag` makes the tree from the mips of the table: a texel of a level
-// holds the four values below it. Both read mips only in uniform control flow, where drivers agree on them.
+// Sampling of texels in proportion to their values (M. McCool and P. Harwood, "Probability Trees", 1997): a point of
+// the unit square is warped level by level. `density_tree.frag` makes the tree from the mips of the table: a texel of a
+// level holds the four values below it. Mips are read only in uniform control flow, where drivers agree on them.
 
 // Where the tree has the first texel of a level, from 1, over a table of this size.
 ivec2 tree_origin(ivec2 size, int level) {

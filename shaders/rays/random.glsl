@@ -30,8 +30,8 @@ uint owen_scramble(uint x, uint seed) {
     return bitfieldReverse(x);
 }
 
-// Point `index`, 0 to 15, of a scrambled Sobol sequence in the unit square: every 4 points that begin at a multiple of 4
-// lie in different quarters of both axes, as do 16 in sixteenths. Different seeds are independent.
+// Point `index`, 0 to 15, of a scrambled Sobol sequence in the unit square: every 4 points that begin at a multiple of
+// 4 lie in different quarters of both axes, as do 16 in sixteenths. Different seeds are independent.
 vec2 sobol_point(uint index, uint seed) {
     uint i = owen_scramble(index, hash(seed)) & 15u;  // another order: several axes have to be independent
     uint x = bitfieldReverse(i);
