@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from collections.abc import Sequence
 from html import escape
 from typing import Any
@@ -14,6 +15,7 @@ from rendergraph.diagrams import Link, Mark, Sheet, draw, sheet
 from rendergraph.diff.structure import GraphDiff, PlanFigures
 from rendergraph.formatting import format_bytes, format_value, jsonable, table
 from rendergraph.link import Graph
+from rendergraph.link.graph import depth_first
 
 Plans = tuple[PlanFigures, PlanFigures]
 
@@ -131,13 +133,11 @@ def _both(a: Graph, b: Graph, difference: GraphDiff) -> tuple[Sheet, dict[str, M
 
 def _backwards(link: Link, present: Sequence[Link]) -> Link:
     """Return a link of the first graph, which leads back if its ends have the opposite order in the second graph."""
-    reached, waiting = {link.target}, [link.target]
-    while waiting:
-        at = waiting.pop()
-        following = {other.target for other in present if other.source == at and not other.previous} - reached
-        reached |= following
-        waiting += following
-    return replace(link, previous=link.previous or link.source in reached)
+    following = defaultdict[str, list[str]](list)
+    for other in present:
+        if not other.previous:
+            following[other.source].append(other.target)
+    return replace(link, previous=link.previous or link.source in depth_first(following, [link.target]))
 
 
 def _legend(y: float) -> list[str]:

@@ -161,26 +161,26 @@ class Graph(Struct, frozen=True, dict=True):
             for name, node in self.members.items()
         }
         order = upstream_first(sources)
-        return order if len(order) == len(self.members) else _depth_first(sources)
+        return order if len(order) == len(self.members) else depth_first(sources)
 
 
-def _depth_first(sources: Mapping[T, Iterable[T]]) -> list[T]:
-    """Sort names behind their sources, but for the links that close a cycle."""
-    order: dict[T, None] = {}
+def depth_first(sources: Mapping[T, Iterable[T]], roots: Iterable[T] | None = None) -> list[T]:
+    """Return names, or roots with all that lies upstream, behind their sources, but for links that close a cycle."""
+    order: list[T] = []
     begun: set[T] = set()
-    for name in sources:
+    for name in sources if roots is None else roots:
         stack = [(name, iter(sources[name]))] if name not in begun else []
         begun.add(name)
         while stack:
             at, left = stack[-1]
             source = next((one for one in left if one not in begun), None)
             if source is None:
-                order[at] = None
+                order.append(at)
                 stack.pop()
             else:
                 begun.add(source)
                 stack.append((source, iter(sources[source])))
-    return list(order)
+    return order
 
 
 def upstream_first(sources: Mapping[T, Collection[T]]) -> list[T]:

@@ -18,7 +18,7 @@ from rendergraph.document import parse
 from rendergraph.errors import InputError
 from rendergraph.link import link
 from rendergraph.link.check import port_kind
-from rendergraph.link.graph import Endpoint, Graph, GraphNode
+from rendergraph.link.graph import Endpoint, Graph, GraphNode, depth_first
 from rendergraph.resolve import resolve
 from rendergraph.resources import shipped_pipelines
 
@@ -87,11 +87,8 @@ def _takes_part(node_type: NodeType, text: str, catalog: Catalog) -> bool:
     graph = _linked(text, catalog)
     if graph is None:
         return False
-    used, stack = set[str](), [end.node for end in graph.outputs.values()]
-    while stack:
-        if (node := stack.pop()) not in used:
-            used.add(node)
-            stack += [end.node for ends in graph[node].inputs.values() for end in ends]
+    sources = {node.id: [end.node for ends in node.inputs.values() for end in ends] for node in graph.nodes}
+    used = depth_first(sources, [end.node for end in graph.outputs.values()])
     return any(graph[node].type.name == node_type.name for node in used)
 
 

@@ -11,7 +11,7 @@ from typing import TypeAlias
 from msgspec import Struct
 
 from rendergraph.errors import InputError, Problem
-from rendergraph.link.graph import upstream_first
+from rendergraph.link.graph import depth_first, upstream_first
 from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import TextureDesc
 
@@ -240,7 +240,8 @@ def read_first_choices(
     turns: dict[str, tuple[StepKey, Sequence[StepKey]]] = {}
     for id in sorted(readers):
         writer = next(iter(versions.writers[id].values())).key
-        earlier, later = _reachable(waits, writer), {key for key in readers[id] if writer in _reachable(waits, key)}
+        earlier = {*depth_first(waits, [writer])}
+        later = {key for key in readers[id] if writer in depth_first(waits, [key])}
         loose = sorted(readers[id] - earlier)
         if loose and not later:
             turns[id] = writer, loose
@@ -249,7 +250,7 @@ def read_first_choices(
         more, early = waits, []
         for id in ids:
             writer, loose = turns[id]
-            if all(writer not in _reachable(more, reader) for reader in loose):
+            if all(writer not in depth_first(more, [reader]) for reader in loose):
                 more = read_first(more, {id: turns[id]})
                 early.append(id)
         return early
@@ -267,16 +268,6 @@ def read_first(waits: Waits, turns: Turns) -> Waits:
     for id, (writer, readers) in turns.items():
         more[writer] = {**more[writer], **dict.fromkeys(readers, (id, "overwrites"))}
     return more
-
-
-def _reachable(waits: Waits, step: StepKey) -> set[StepKey]:
-    """Return a step and all that it waits for."""
-    seen, stack = {step}, [step]
-    while stack:
-        fresh = [earlier for earlier in waits[stack.pop()] if earlier not in seen]
-        seen.update(fresh)
-        stack += fresh
-    return seen
 
 
 def _two_writers(resource: str, one: Step, other: Step) -> Problem:

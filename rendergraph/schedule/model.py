@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
-from typing import NamedTuple, TypeVar
+from collections.abc import Collection, Hashable, Mapping, Sequence
+from typing import NamedTuple
 
 from msgspec import Struct
 
+from rendergraph.link.graph import depth_first
 from rendergraph.schedule.dependencies import Versions, Waits, is_filled_by_update, touched_ids
 from rendergraph.steps import Resource, Step
 from rendergraph.textures import TextureDesc
 
-K = TypeVar("K", bound=Hashable)
 # Counting where a texture must live costs a visit per step and texture; long graphs count only where it is touched.
 MUST_LIVE_VISITS = 20_000
 
@@ -80,7 +80,7 @@ class Model(Struct, frozen=True):
             sinks: the steps the frame is rendered for, in a fixed order.
         """
         by_key = {step.key: step for step in kept}
-        order = depth_first([step.key for step in sinks], waits.__getitem__)
+        order = depth_first(waits, [step.key for step in sinks])
         number = {key: place for place, key in enumerate(order)}
         steps = tuple(by_key[key] for key in order)
         before = tuple(tuple(sorted(number[key] for key in waits[step])) for step in order)
@@ -240,23 +240,3 @@ def alive_all_frame(resources: Mapping[str, Resource], versions: Versions) -> se
         for id, resource in resources.items()
         if resource.role in ("history", "kept", "scene") or is_filled_by_update(id, resource, versions)
     }
-
-
-def depth_first(roots: Iterable[K], earlier: Callable[[K], Iterable[K]]) -> list[K]:
-    """Return roots and all that lies before them, depth first, each behind what is before it."""
-    order: list[K] = []
-    seen: set[K] = set()
-    for root in roots:
-        stack = [(root, iter(earlier(root)))] if root not in seen else []
-        seen.add(root)
-        while stack:
-            key, waiting = stack[-1]
-            for one in waiting:
-                if one not in seen:
-                    seen.add(one)
-                    stack.append((one, iter(earlier(one))))
-                    break
-            else:
-                order.append(key)
-                stack.pop()
-    return order

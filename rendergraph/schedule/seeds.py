@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from heapq import heapify, heappop, heappush
 
-from rendergraph.schedule.model import Model, depth_first
+from rendergraph.link.graph import depth_first
+from rendergraph.schedule.model import Model
 
 
 def seeds(model: Model) -> Iterator[list[int]]:
@@ -47,7 +48,7 @@ def post_order(model: Model) -> list[int]:
         children[step], most, held = sequence(model.before[step])
         need[step] = max(most, held + model.born[step])
     roots, _, _ = sequence([step for step in range(count) if not model.after[step]])
-    return depth_first(roots, children.__getitem__)
+    return depth_first(dict(enumerate(children)), roots)
 
 
 def list_schedule(model: Model, *, backwards: bool = False) -> list[int]:
