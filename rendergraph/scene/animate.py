@@ -20,7 +20,7 @@ from rendergraph.scene.model import Matrix, Placement, Scene
 from rendergraph.scene.surroundings import lit
 
 if TYPE_CHECKING:
-    from rendergraph.scene.rig import Playback, Pose
+    from rendergraph.scene.rig import Pose
 
 _MOMENTS = 12
 """Of a clip that a framing camera looks at."""
@@ -48,12 +48,15 @@ def moves(scene: Scene) -> bool:
     return bool(scene.keyframes) or scene.orbit is not None or any(rig.length for rig in scene.rigs)
 
 
-def play(scene: Scene, playback: Playback | None) -> Scene:
-    """Return the scene of an animated file with a clip playing, as it is at first; without one at rest for good."""
+def play(scene: Scene, clip: str | None = None, speed: float = 1.0, start: float = 0.0) -> Scene:
+    """Return the scene of an animated file with a clip playing, by default its first one, as it is at first."""
     (rig,) = scene.rigs
-    if playback is not None:
-        clip = rig.clips[playback.clip or next(iter(rig.clips))]
-        return _posed(replace(scene, rigs=(replace(rig, clip=clip, playback=playback),)), 0.0)
+    chosen = rig.clips[clip or next(iter(rig.clips))]
+    return _posed(replace(scene, rigs=(replace(rig, clip=chosen, speed=speed, start=start),)), 0.0)
+
+
+def at_rest(scene: Scene) -> Scene:
+    """Return the scene of an animated file as its nodes stand, for good."""
     return replace(baked(_posed(scene, 0.0)), rigs=(), placements={})
 
 

@@ -41,8 +41,7 @@ def load(
         unknown = Problem("RG303", f"'{shown(path.name)}' is not a scene; a scene ends in", Place(str(path)))
         scene = read_mesh(path, reading, unknown, EXTENSIONS)
         if scene.rigs:
-            from rendergraph.scene.animate import play  # for animated files alone
-            from rendergraph.scene.rig import Playback  # likewise
+            from rendergraph.scene.animate import at_rest, play  # for animated files alone
 
-            scene = play(scene, Playback() if scene.rigs[0].clips else None)
+            scene = play(scene) if scene.rigs[0].clips else at_rest(scene)
     return replace(scene, warnings=reading.warnings)

@@ -168,14 +168,6 @@ class Clip(Struct, frozen=True):
     tracks: tuple[Track, ...]
 
 
-class Playback(Struct, frozen=True):
-    """A clip of a file, by default its first one, from its second `start` on; it repeats."""
-
-    clip: str | None = None
-    speed: float = 1.0
-    start: float = 0.0
-
-
 class Part(Struct, frozen=True, eq=False):
     """An object of a file: its node, its transform inside that, (4, 4), and the skin that moves it instead, or -1."""
 
@@ -201,7 +193,7 @@ class Rig(Struct, frozen=True, eq=False, dict=True):
         weights: by node those of its morph targets at rest.
         objects, lights, cameras: what the file's placements consist of, in their order: parts, nodes and nodes.
         placements: in `Scene.placements`, with their transforms, (4, 4); more than one where a file is repeated.
-        clip: what is played; None for the rest pose.
+        clip: what is played over and over, from its second `start` on; None for the rest pose.
     """
 
     parents: Ints
@@ -215,12 +207,13 @@ class Rig(Struct, frozen=True, eq=False, dict=True):
     cameras: tuple[int, ...] = ()
     placements: tuple[tuple[str, Doubles], ...] = (("", np.eye(4)),)
     clip: Clip | None = None
-    playback: Playback = Playback()
+    speed: float = 1.0
+    start: float = 0.0
 
     @property
     def length(self) -> float:
         """Seconds until it repeats; 0 where nothing moves."""
-        return self.clip.length / abs(self.playback.speed) if self.clip is not None and self.playback.speed else 0.0
+        return self.clip.length / abs(self.speed) if self.clip is not None and self.speed else 0.0
 
     def at(self, time: float) -> tuple[Doubles, list[tuple[Doubles, Doubles, Doubles]]]:
         """Return the transforms of all nodes to the file's space, (n, 4, 4), and the state of each object.
@@ -228,7 +221,7 @@ class Rig(Struct, frozen=True, eq=False, dict=True):
         That is its transform in the file, those of its joints, (j, 3, 4), and the weights of its targets, (t,).
         """
         streams, weights = {name: values.copy() for name, values in self.rest.items()}, dict(self.weights)
-        moment = self.playback.start + self.playback.speed * time
+        moment = self.start + self.speed * time
         if self.clip is not None and self.clip.length:
             moment %= self.clip.length
         for track in self.clip.tracks if self.clip is not None else ():

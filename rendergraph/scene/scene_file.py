@@ -44,7 +44,7 @@ from rendergraph.scene.repeat import Copies, copies, count_of, read_columns
 from rendergraph.scene.shapes import SHAPES, ShapePart, build
 
 if TYPE_CHECKING:
-    from rendergraph.scene.rig import Playback, Rig
+    from rendergraph.scene.rig import Rig
 
 _DEFAULT = Material("default", base_color=(0.8, 0.8, 0.8, 1.0))
 _SRGB = ("base_color", "emissive", "specular_color")
@@ -88,7 +88,7 @@ class _Reader:
         self.placements: dict[str, Placement] = {}
         self.copies: dict[tuple[str, str], Copies] = {}
         self.shapes: dict[tuple[Any, ...], tuple[int, list[ShapePart]]] = {}
-        self.files: dict[tuple[Path, Playback | None], _File] = {}
+        self.files: dict[tuple[Any, ...], _File] = {}
         self.mesh_files: dict[Path, Scene] = {}
         self.rigs: list[Rig] = []
         self.material_numbers: dict[str | None, int] = {}
@@ -410,29 +410,29 @@ class _Reader:
             self.reading.add_warnings(inner.warnings)
         scene = self.mesh_files[path]
         playback = self._playback(name, entry, scene)
-        if (path, playback) not in self.files:
-            scene = animate.play(scene, playback) if scene.rigs else scene
+        key = path, *sorted((playback or {}).items()), playback is None
+        if key not in self.files:
+            if scene.rigs:
+                scene = animate.at_rest(scene) if playback is None else animate.play(scene, **playback)
             rig = len(self.rigs) if scene.rigs else None
-            self.files[path, playback] = _File(scene, len(self.meshes), len(self.materials), rig)
+            self.files[key] = _File(scene, len(self.meshes), len(self.materials), rig)
             self.rigs += [replace(each, placements=()) for each in scene.rigs]
             self.meshes += scene.meshes
             self.materials += [replace(material, name=f"{name}/{material.name}") for material in scene.materials]
-        return self.files[path, playback]
+        return self.files[key]
 
-    def _playback(self, name: str, entry: Value, scene: Scene) -> Playback | None:
-        """The clip that an object plays, None at rest."""
+    def _playback(self, name: str, entry: Value, scene: Scene) -> dict[str, Any] | None:
+        """The clip that an object plays, and how; None at rest."""
         if (place := entry.get("animation")) is None or place.data is None:
             return None
-        clips = scene.rigs[0].clips if scene.rigs else {}
-        values = plain(place, scene_keys.ANIMATION)
-        if not clips or values.get("clip", next(iter(clips))) not in clips:
-            what = f"no clip '{shown(values['clip'])}'" if "clip" in values else "no clips"
-            text = f"object '{shown(name)}': its file has {what}{suggestion(values.get('clip', ''), clips)}"
-            self.validator.report(place.get("clip") or place, "RG322", text)
-            return None
-        from rendergraph.scene.rig import Playback  # for animated files alone
-
-        return Playback(**values)
+        clips: Mapping[str, Any] = scene.rigs[0].clips if scene.rigs else {}
+        values: dict[str, Any] = {"clip": next(iter(clips), None), **plain(place, scene_keys.ANIMATION)}
+        if values["clip"] in clips:
+            return values
+        what = f"no clip '{shown(values['clip'])}'" if values["clip"] else "no clips"
+        text = f"object '{shown(name)}': its file has {what}{suggestion(values['clip'] or '', clips)}"
+        self.validator.report(place.get("clip") or place, "RG322", text)
+        return None
 
     def _overrides(
         self, entries: Mapping[str, Value], name: str, scene: Scene, materials: Sequence[str]
