@@ -141,8 +141,7 @@ EnvironmentMap = Semantic(
 Any = Semantic("any", "Whatever is connected.")
 View = Semantic("view", "Matrices and size that geometry is drawn with.")
 Velocity = Semantic(
-    "velocity",
-    "Screen-space motion since the previous frame, in widths and heights of the picture, without jitter.",
+    "velocity", "Screen-space motion since the previous frame, in widths and heights of the picture, without jitter."
 )
 SceneData = Semantic("scene_data", "The scene as buffers and texture arrays, for `#include <scene.glsl>`.")
 

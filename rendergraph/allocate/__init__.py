@@ -252,11 +252,7 @@ def _fewest_views(ids: Iterable[str], classes: Kinds, by_desc: Groups, by_class:
 
 
 def _blocks(
-    ids: Sequence[str],
-    lifetimes: Mapping[str, Lifetime],
-    sizes: Mapping[str, int],
-    classes: Kinds,
-    by_desc: Groups,
+    ids: Sequence[str], lifetimes: Mapping[str, Lifetime], sizes: Mapping[str, int], classes: Kinds, by_desc: Groups
 ) -> Groups:
     textures = [id for id in ids if not isinstance(classes[id], BufferDesc)]
     items = tuple([HeapItem(sizes[id], lifetimes[id].first, lifetimes[id].last, classes[id]) for id in textures])

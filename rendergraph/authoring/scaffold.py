@@ -46,10 +46,7 @@ _IN_PACKAGE = {
     "pipeline": 'ROOT / "pipelines" / "@name@.yaml"',
     "plugins": ", plugins=PLUGINS",
 }
-_IN_PROJECT = _IN_PLACE | {
-    "where": "HERE = Path(__file__).parents[1]",
-    "plugins": ', plugins=[HERE / "@nodes@"]',
-}
+_IN_PROJECT = _IN_PLACE | {"where": "HERE = Path(__file__).parents[1]", "plugins": ', plugins=[HERE / "@nodes@"]'}
 _PROJECT_NODE = "lens_falloff"
 _ROOTS = ("nodes", "shaders")
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*\Z")

@@ -176,11 +176,7 @@ def search(
 
 
 def check_search(
-    base: Pipeline,
-    space: Space,
-    reference: Path | Pipeline | None,
-    minimise: Sequence[str],
-    metric: str | None = None,
+    base: Pipeline, space: Space, reference: Path | Pipeline | None, minimise: Sequence[str], metric: str | None = None
 ) -> Prepared:
     """Check everything about a search that can be checked without GL, and return the runs at the ends of the axes."""
     space.check(spans=True)

@@ -213,10 +213,7 @@ class ReferenceTask(Task):
 
 
 def _reference(
-    run: Run,
-    arrays: Mapping[str, Pixels],
-    encoding: Encoding,
-    kind: Literal["variant", "pipeline"] = "variant",
+    run: Run, arrays: Mapping[str, Pixels], encoding: Encoding, kind: Literal["variant", "pipeline"] = "variant"
 ) -> Reference:
     return Reference(run.name, kind, arrays[run.output], encoding, run.output, arrays.get("radiance"))
 

@@ -117,11 +117,7 @@ class WorkerProcess:
         self._heard = 0.0
 
     def send(
-        self,
-        task: Task,
-        values: Mapping[str, bytes],
-        environment: Mapping[str, str] | None = None,
-        **folders: str,
+        self, task: Task, values: Mapping[str, bytes], environment: Mapping[str, str] | None = None, **folders: str
     ) -> None:
         """Send a task with pickled values by digest, each once; start a process if necessary.
 

@@ -26,13 +26,7 @@ if TYPE_CHECKING:
 READ = "PNG, JPEG, HDR, EXR, BMP and TGA are read"
 MOST_CHANNELS = 256
 _RATIO_FROM = 64 << 20
-_MAGIC = {
-    b"\x89PNG\r\n\x1a\n": ".png",
-    b"\xff\xd8\xff": ".jpg",
-    b"v/1\x01": ".exr",
-    b"#?": ".hdr",
-    b"BM": ".bmp",
-}
+_MAGIC = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg", b"v/1\x01": ".exr", b"#?": ".hdr", b"BM": ".bmp"}
 _FORMATS = {".png": "png", ".jpg": "jpeg", ".exr": "openexr", ".hdr": "hdr", ".bmp": "bmp", ".tga": "targa"}
 """Extension to OpenImageIO's name of the format."""
 _JPEG_SEGMENT = re.compile(rb"\xff+([\x01-\xfe])(..)", re.DOTALL)

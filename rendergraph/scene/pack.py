@@ -149,11 +149,7 @@ def with_adjacency(packed: PackedScene) -> tuple[npt.NDArray[np.uint32], Records
 
 def blocks(packed: PackedScene) -> dict[str, Records | Floats]:
     """Return the tables that shaders read, by the names of their blocks."""
-    tables = {
-        "light_block": packed.lights,
-        "material_block": packed.materials,
-        "environment_block": packed.environment,
-    }
+    tables = {"light_block": packed.lights, "material_block": packed.materials, "environment_block": packed.environment}
     return {**tables, "material_uv_block": packed.material_uvs} if packed.material_moved.any() else {**tables}
 
 

@@ -97,16 +97,12 @@ OBJECT = Table(
         Key(
             "repeat",
             _repeat(
-                (_share("scale", "the size"),),
-                (Key("material", listed(NAME, "names", 1), "Names under `materials`."),),
+                (_share("scale", "the size"),), (Key("material", listed(NAME, "names", 1), "Names under `materials`."),)
             ),
             "Draws it many times; the copies are called `name.0`, `name.1` and so on.",
         ),
     ),
-    {
-        "shape": {name: shape.keys for name, shape in SHAPES.items()},
-        "file": (_OVERRIDES, _PLAYS),
-    },
+    {"shape": {name: shape.keys for name, shape in SHAPES.items()}, "file": (_OVERRIDES, _PLAYS)},
 )
 
 TEXTURES = (

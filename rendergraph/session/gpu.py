@@ -23,11 +23,7 @@ class Gpu:
     """Where pipelines are rendered; its `cache` has programs, the scene and compiled pipelines."""
 
     def __init__(
-        self,
-        device: int | None = None,
-        *,
-        ctx: moderngl.Context | None = None,
-        cache: CacheLimits | None = None,
+        self, device: int | None = None, *, ctx: moderngl.Context | None = None, cache: CacheLimits | None = None
     ) -> None:
         """Open a context.
 

@@ -36,10 +36,7 @@ class Session(Gpu):
         return as_pipeline(pipeline).render(size, session=self, progress=progress, **options)
 
     def frames(
-        self,
-        pipeline: Pipeline | str | Path,
-        size: tuple[int, int] | None = None,
-        **options: Unpack[RenderKeywords],
+        self, pipeline: Pipeline | str | Path, size: tuple[int, int] | None = None, **options: Unpack[RenderKeywords]
     ) -> Iterator[Frame]:
         """Render a pipeline frame by frame; see `Pipeline.frames`."""
         return as_pipeline(pipeline).frames(size, session=self, **options)

@@ -21,13 +21,7 @@ _RANGE = re.compile(r"([0-9]{1,6})(?:-([0-9]{1,6}))?\Z")
 
 
 def template(
-    listing: Listing,
-    sweep: Path,
-    folder: Path,
-    *,
-    frames: range | None,
-    chunk: int,
-    most_tasks: int = MOST_TASKS,
+    listing: Listing, sweep: Path, folder: Path, *, frames: range | None, chunk: int, most_tasks: int = MOST_TASKS
 ) -> dict[str, Any]:
     """Return the job's template; its defaults are paths relative to `folder`, in which it will be written.
 

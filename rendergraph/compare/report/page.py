@@ -8,16 +8,7 @@ from datetime import UTC, datetime
 from html import escape
 
 from rendergraph.compare.engine import Sweep
-from rendergraph.compare.report.html import (
-    card,
-    drawing,
-    milliseconds,
-    number,
-    section,
-    software_note,
-    table,
-    template,
-)
+from rendergraph.compare.report.html import card, drawing, milliseconds, number, section, software_note, table, template
 from rendergraph.compare.report.pictures import first_differences, sheet, signed_sheet, viewer
 from rendergraph.compare.report.scatter import Point, scatter_svg
 from rendergraph.compare.results import Comparison, Result, Search, machine, pareto
