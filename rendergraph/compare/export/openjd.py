@@ -8,9 +8,11 @@ that a worker needs is a parameter of the job, which requires `FEATURE_BUNDLE_1`
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
+
+import yaml
 
 from rendergraph.compare.runner import Listing
 from rendergraph.errors import InputError, Problem
@@ -31,70 +33,26 @@ def template(
     if len(groups) > most_tasks:
         text = f"the sweep has {len(groups)} groups of runs, more than the {most_tasks} of a template; split the sweep"
         raise InputError(Problem("RG524", text))
-    parameters = _parameters(sweep, folder)
-    steps = [_step("Measure", [{"name": "Runs", "type": "STRING", "range": groups}], _MEASURE)]
-    if frames is not None:
-        chunks = {"defaultTaskCount": "{{Param.Chunk}}", "rangeConstraint": "CONTIGUOUS"}
-        run = {"name": "Run", "type": "INT", "range": f"1-{len(listing.prepared.runs)}"}
-        frame = {"name": "Frame", "type": "CHUNK[INT]", "range": "{{Param.Frames}}", "chunks": chunks}
-        steps.append(_step("Frames", [run, frame], _FRAMES))
-        first_last = f"{frames[0]}-{frames[-1]}"
-        parameters.append(_parameter("Frames", "STRING", "The frames to render of each run.", default=first_last))
-        parameters.append(_parameter("Chunk", "INT", "Frames per task.", minValue=1, default=chunk))
-    after = [{"dependsOn": step["name"]} for step in steps]
-    report = {"name": "Report", "dependencies": after, **_NEEDS, "script": _script(_REPORT)}
-    name = listing.prepared.study["pipeline"]
     runs = len(listing.prepared.runs)
-    return {
-        "specificationVersion": "jobtemplate-2023-09",
-        "extensions": ["FEATURE_BUNDLE_1", *(["TASK_CHUNKING"] if frames is not None else [])],
-        "name": f"Sweep of {re.sub(r'[^ -~]|[{}]', '_', name)[:100]}",
-        "description": f"{runs} runs, in groups that share passes; by rendergraph farm export.",
-        "parameterDefinitions": parameters,
-        "steps": [*steps, report],
-    }
-
-
-def _parameters(sweep: Path, folder: Path) -> list[dict[str, Any]]:
-    beneath = sweep.resolve().is_relative_to(folder.resolve())
-    where = sweep.resolve().relative_to(folder.resolve()) if beneath else None
-    file, files = ({"default": where.as_posix()}, {"default": where.parent.as_posix()}) if where else ({}, {})
-    results = f"{sweep.stem}-results"
-    inputs = "The files of its pipelines, scenes and nodes. A farm that transfers files transfers these."
-    return [
-        _parameter("Sweep", "PATH", "The file of the sweep.", objectType="FILE", dataFlow="IN", **file),
-        _parameter("Files", "PATH", inputs, objectType="DIRECTORY", dataFlow="IN", **files),
-        _parameter(
-            "Output",
-            "PATH",
-            "The folder of the results, shared by all workers.",
-            objectType="DIRECTORY",
-            dataFlow="OUT",
-            default=results,
-        ),
-        _parameter("GPUs", "INT", "GPUs that a worker needs; 0 for a rasteriser on the CPU.", minValue=0, default=1),
-        _parameter("Rendergraph", "STRING", "The program, as workers call it.", default="rendergraph"),
-    ]
-
-
-def _parameter(name: str, type_: str, description: str, **more: Any) -> dict[str, Any]:
-    return {"name": name, "type": type_, **more, "description": description}
-
-
-_SWEEP, _OUT = "{{Param.Sweep}}", "{{Param.Output}}"
-_MEASURE = ("farm", "measure", _SWEEP, "--runs", "{{Task.Param.Runs}}", "-o", _OUT)
-_FRAMES = ("farm", "frames", _SWEEP, "--runs", "{{Task.Param.Run}}", "--frames", "{{Task.Param.Frame}}", "-o", _OUT)
-_REPORT = ("sweep", _SWEEP, "-o", _OUT, "--resume", "--csv")
-_NEEDS = {"hostRequirements": {"amounts": [{"name": "amount.worker.gpu", "min": "{{Param.GPUs}}"}]}}
-
-
-def _step(name: str, parameters: Sequence[dict[str, Any]], words: Sequence[str]) -> dict[str, Any]:
-    space = {"taskParameterDefinitions": list(parameters)}
-    return {"name": name, **_NEEDS, "parameterSpace": space, "script": _script(words)}
-
-
-def _script(words: Sequence[str]) -> dict[str, Any]:
-    return {"actions": {"onRun": {"command": "{{Param.Rendergraph}}", "args": list(words)}}}
+    defaults: dict[str, Any] = {"Output": f"{sweep.stem}-results", "Chunk": chunk}
+    if sweep.resolve().is_relative_to(folder.resolve()):
+        where = sweep.resolve().relative_to(folder.resolve())
+        defaults |= {"Sweep": where.as_posix(), "Files": where.parent.as_posix()}
+    job: dict[str, Any] = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
+    job["name"] = f"Sweep of {re.sub(r'[^ -~]|[{}]', '_', listing.prepared.study['pipeline'])[:100]}"
+    job["description"] = f"{runs} runs, in groups that share passes; by rendergraph farm export."
+    measure, render, report = job["steps"]
+    measure["parameterSpace"]["taskParameterDefinitions"][0]["range"] = groups
+    render["parameterSpace"]["taskParameterDefinitions"][0]["range"] = f"1-{runs}"
+    if frames is not None:
+        defaults["Frames"] = f"{frames[0]}-{frames[-1]}"
+    else:
+        del job["extensions"][1], job["parameterDefinitions"][-2:], job["steps"][1], report["dependencies"][1]
+    for parameter in job["parameterDefinitions"]:
+        parameter["default"] = defaults.get(parameter["name"], parameter["default"])
+        if parameter["default"] is None:
+            del parameter["default"]
+    return job
 
 
 def numbers_text(numbers: Iterable[int]) -> str:
