@@ -29,26 +29,13 @@ def reduced_size(node: Any, facts: Facts) -> tuple[int, int]:
     return math.ceil(desc.width * node.scale), math.ceil(desc.height * node.scale)
 
 
-class ScreenSpaceOcclusion(Node):
-    """Base of the techniques that know the scene only by depth and normals of the picture.
-
-    `record` calls `gather_surfaces` first, then computes occlusion at the reduced size, and passes it to `upsample` if
-    that is not the picture's size.
-    """
-
-    twin: ClassVar[str | None] = "traced_occlusion"
+class ReducedResolution(Node):
+    """Base of the techniques that compute something for each pixel of the picture, or for fewer and interpolate."""
 
     depth = Input(Depth, doc="Window depth; positions come from it and its view.")
     normal = Input(Normal, doc="Unit normal, world space.")
-    occlusion = Output(
-        Occlusion, format="r16", size="depth", doc="Ambient visibility: 1 open, 0 occluded; 1 for background."
-    )
     surfaces = Internal(format="rgba32f", size=reduced_size, view="depth")
-    unfiltered = Internal(format="r16", size=reduced_size)
 
-    radius: float = param(
-        default=0.5, unit="m", min=1e-6, max=1e6, doc="Surfaces farther away than this do not occlude."
-    )
     scale: float = structural(
         default=1.0, min=0.125, max=1, doc="Resolution relative to the picture's width and height."
     )
@@ -72,11 +59,9 @@ class ScreenSpaceOcclusion(Node):
         """Return the inputs of `surfaces.frag`."""
         return {"depth": self.depth, "normal": self.normal, "reduced_size": steps.desc(self.surfaces).size}
 
-    def reduced_target(self, steps: Steps, reduced: Port) -> Port:
-        """Return the target of the last pass at the reduced size: `reduced`, or `occlusion` at full size."""
-        return reduced if self.size_defines(steps) else self.occlusion
-
-    def upsample(self, steps: Steps, source: Port, out: Mapping[str, Port], defines: Mapping[str, int]) -> None:
+    def upsample(
+        self, steps: Steps, source: Port, out: Mapping[str, Port], defines: Mapping[str, int], **values: Any
+    ) -> None:
         """Record the upsampling of a reduced texture.
 
         Args:
@@ -84,6 +69,7 @@ class ScreenSpaceOcclusion(Node):
             source: a reduced texture.
             out: outputs by their names in `outputs.glsl`.
             defines: macros of the shader, such as `HAS_VECTOR`.
+            values: further arguments of the step, such as a `radius` in metres, where the node has none.
         """
         steps.fullscreen(
             "upsample.frag",
@@ -93,4 +79,28 @@ class ScreenSpaceOcclusion(Node):
             depth=self.depth,
             normal=self.normal,
             defines={**defines, **self.size_defines(steps), "FINAL": 1},
+            **values,
         )
+
+
+class ScreenSpaceOcclusion(ReducedResolution):
+    """Base of the techniques that know the scene only by depth and normals of the picture.
+
+    `record` calls `gather_surfaces` first, then computes occlusion at the reduced size, and passes it to `upsample` if
+    that is not the picture's size.
+    """
+
+    twin: ClassVar[str | None] = "traced_occlusion"
+
+    occlusion = Output(
+        Occlusion, format="r16", size="depth", doc="Ambient visibility: 1 open, 0 occluded; 1 for background."
+    )
+    unfiltered = Internal(format="r16", size=reduced_size)
+
+    radius: float = param(
+        default=0.5, unit="m", min=1e-6, max=1e6, doc="Surfaces farther away than this do not occlude."
+    )
+
+    def reduced_target(self, steps: Steps, reduced: Port) -> Port:
+        """Return the target of the last pass at the reduced size: `reduced`, or `occlusion` at full size."""
+        return reduced if self.size_defines(steps) else self.occlusion

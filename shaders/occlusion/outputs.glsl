@@ -11,6 +11,9 @@ out vec4 bent_normal;  // world space
 #ifdef WRITES_INDIRECT
 out vec4 indirect;
 #endif
+#ifdef WRITES_REFLECTIONS
+out vec4 reflections;
+#endif
 #else
 out Value filtered;
 #endif
@@ -43,6 +46,9 @@ void write_outputs(Value value) {
 #endif
 #ifdef WRITES_INDIRECT
     indirect = vec4(value.xyz, 1.0);
+#endif
+#ifdef WRITES_REFLECTIONS
+    reflections = value;
 #endif
 #else
     filtered = value;

@@ -3,7 +3,11 @@
 #ifdef HAS_VECTOR
 #define Value vec4
 #define VALUE_CHANNELS rgba
+#ifdef WRITES_REFLECTIONS
+const Value OPEN_VALUE = vec4(0.0);  // no confidence
+#else
 const Value OPEN_VALUE = vec4(0.0, 0.0, 0.0, 1.0);
+#endif
 #else
 #define Value float
 #define VALUE_CHANNELS r
