@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from rendergraph.compile.culling import commands
 from rendergraph.compile.programs import ProgramCache
-from rendergraph.compile.scene_buffers import SceneBuffers
+from rendergraph.compile.scene_buffers import SceneBuffers, check_size
 from rendergraph.expand import SCENE_DATA
 from rendergraph.gl import textures
 from rendergraph.gl.device import Device
@@ -215,6 +215,7 @@ class GpuScene(Struct, eq=False, dict=True):
         if self._tree is None:
             trees = self._mesh_trees()
             rows = object_rows(self.packed, self.data.instances["flags"], trees)
+            check_size(self.device, "scene_tree_block", rows.nbytes + trees.rows.nbytes)
             self._tree = trees, self.device.ctx.buffer(rows.tobytes() + trees.rows.tobytes())
         return self._tree[1]
 

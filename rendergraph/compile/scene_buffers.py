@@ -60,11 +60,8 @@ class SceneBuffers(Struct, eq=False):
         }
         if found.arrays:
             arrays["scene_texture_block"] = scene_data.texture_data(scene, sizes, found)
-        most = device.limits["storage_block"]
         for name, array in arrays.items():
-            if array.nbytes > most:
-                text = f"the scene's '{name}' takes {array.nbytes} bytes, a storage block of this device holds {most}"
-                raise RenderError(Problem("RG435", text))
+            check_size(device, name, array.nbytes)
         buffers = {name: device.ctx.buffer(array.tobytes() or bytes(128)) for name, array in arrays.items()}
         buffers["scene_index_block"] = indices
         made = {
@@ -95,3 +92,11 @@ def _copy_with_border(device: Device, image: GpuTexture, array: GpuTexture, laye
             source = image.glo, image.target, 0, x, y, 0
             target = array.glo, array.target, 0, to_x, to_y, layer
             device.raw.glCopyImageSubData(*source, *target, width, height, 1)
+
+
+def check_size(device: Device, name: str, size: int) -> None:
+    """Refuse a buffer of the scene's that is larger than a storage block may be: shaders would see a part of it."""
+    most = device.limits["storage_block"]
+    if size > most:
+        text = f"the scene's '{name}' takes {size} bytes, a storage block of this device holds {most}"
+        raise RenderError(Problem("RG435", text))

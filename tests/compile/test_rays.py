@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import OpenImageIO as oiio
 import pytest
 from msgspec.structs import replace
 
@@ -282,3 +283,42 @@ def test_no_ray_passes_between_triangles(bench: Any) -> None:
     found = trace(bench, scene, origin, points - origin)
     assert (found["traced"][:, 0] == 0).all()
     np.testing.assert_allclose(found["traced"][:, 2], 1, atol=2e-3)
+
+
+MASKED = """
+cameras: {main: {eye: [0, 0, 5], target: [0, 0, 0]}}
+materials:
+  mask: {alpha_mode: mask, alpha_cutoff: 0.5, base_color_texture: holes.png, double_sided: true}
+  glass: {alpha_mode: blend, base_color: [1, 1, 1, 0.5]}
+  wall: {}
+objects:
+  first: {shape: plane, size: [2, 2], at: [0, 0, 2], rotate_degrees: [90, 0, 0], material: mask}
+  second: {shape: plane, size: [2, 2], at: [0, 0, 1], rotate_degrees: [90, 0, 0], material: mask}
+  pane: {shape: plane, size: [9, 9], rotate_degrees: [90, 0, 0], material: glass}
+  wall: {shape: plane, size: [9, 9], at: [0, 0, -1], rotate_degrees: [90, 0, 0], material: wall}
+"""
+
+
+def test_alpha_masks_let_rays_through(bench: Any) -> None:
+    """The left half of two masked planes is cut away; a pane of glass is hit, and casts no shadow."""
+    texels = np.full((4, 8, 4), 255, np.uint8)
+    texels[:, :4, 3] = 0
+    image = oiio.ImageBuf(oiio.ImageSpec(8, 4, 4, "uint8"))
+    image.set_pixels(oiio.ROI(), texels)
+    image.write(str(bench.folder / "holes.png"))
+    x = np.tile([-0.7, 0.7, -3, 3], 16)
+    origin = np.stack([x, 0.1 + 0 * x, 5 + 0 * x], axis=1)
+    found = trace(bench, MASKED, origin, np.tile([0.0, 0, -1], (64, 1)))
+    np.testing.assert_array_equal(found["traced"][:4, 0], [2, 0, 2, 2])
+    np.testing.assert_allclose(found["traced"][:4, 2], [5, 3, 5, 5], atol=1e-5)
+    assert (found["more"][:, 0] == 1).all()  # the wall, or a mask in front of it
+    behind = np.stack([x, 0.1 + 0 * x, 0.5 + 0 * x], axis=1)
+    towards = trace(bench, MASKED, behind, np.tile([0.0, 0, 1], (64, 1)))
+    np.testing.assert_array_equal(towards["more"][:4, 1], [0, 1, 0, 0])
+
+
+def test_a_buffer_that_is_too_large_for_the_device_is_refused(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(bench.session.device.limits, "storage_block", 30000)
+    origin, direction = random_rays(np.zeros(3), np.ones(3), 64)
+    with pytest.raises(rg.errors.RenderError, match=r"RG435 the scene's 'scene_tree_block' takes"):
+        trace(bench, "objects: {one: {shape: sphere, segments: 16}}\n", origin, direction)
