@@ -6,9 +6,10 @@ Nothing here touches GL: a format knows its GL enum as a number so that `gl` nee
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any as AnyType
-from typing import Literal
+from typing import Literal, cast
 
 from msgspec import Struct
 
@@ -56,48 +57,16 @@ class Format(Struct, frozen=True):
         return self.family == "unorm" and self.bytes == self.components and self.name != "rgb10_a2"
 
 
-_FORMAT_ROWS: tuple[tuple[str, int, int, int, Family], ...] = (
-    ("r8", 0x8229, 1, 1, "unorm"),
-    ("rg8", 0x822B, 2, 2, "unorm"),
-    ("rgba8", 0x8058, 4, 4, "unorm"),
-    ("srgb8_a8", 0x8C43, 4, 4, "unorm"),
-    ("r16", 0x822A, 1, 2, "unorm"),
-    ("rg16", 0x822C, 2, 4, "unorm"),
-    ("rgba16", 0x805B, 4, 8, "unorm"),
-    ("rgb10_a2", 0x8059, 4, 4, "unorm"),
-    ("rgba16_snorm", 0x8F9B, 4, 8, "snorm"),
-    ("r16f", 0x822D, 1, 2, "float"),
-    ("rg16f", 0x822F, 2, 4, "float"),
-    ("rgba16f", 0x881A, 4, 8, "float"),
-    ("r11f_g11f_b10f", 0x8C3A, 3, 4, "float"),
-    ("r32f", 0x822E, 1, 4, "float"),
-    ("rg32f", 0x8230, 2, 8, "float"),
-    ("rgba32f", 0x8814, 4, 16, "float"),
-    ("r8ui", 0x8232, 1, 1, "uint"),
-    ("rg8ui", 0x8238, 2, 2, "uint"),
-    ("rgba8ui", 0x8D7C, 4, 4, "uint"),
-    ("r16ui", 0x8234, 1, 2, "uint"),
-    ("rg16ui", 0x823A, 2, 4, "uint"),
-    ("rgba16ui", 0x8D76, 4, 8, "uint"),
-    ("r32ui", 0x8236, 1, 4, "uint"),
-    ("rg32ui", 0x823C, 2, 8, "uint"),
-    ("rgba32ui", 0x8D70, 4, 16, "uint"),
-    ("r32i", 0x8235, 1, 4, "int"),
-    ("rg32i", 0x823B, 2, 8, "int"),
-    ("rgba32i", 0x8D82, 4, 16, "int"),
-    ("depth16", 0x81A5, 1, 2, "depth"),
-    ("depth32f", 0x8CAC, 1, 4, "depth"),
-    ("depth24_stencil8", 0x88F0, 1, 4, "depth_stencil"),
-    ("depth32f_stencil8", 0x8CAD, 1, 8, "depth_stencil"),
-)
+def _formats() -> Iterator[Format]:
+    """Yield the formats of `formats.txt`: name, GL's enum, components, bytes and family."""
+    for line in Path(__file__).with_name("formats.txt").read_text(encoding="ascii").splitlines():
+        name, enum, components, size, word = line.split()
+        family = cast("Family", word)
+        view_class = name if family.startswith("depth") else f"{8 * int(size)}-bit"
+        yield Format(name, int(enum, 16), int(components), int(size), family, view_class, name.startswith("srgb"))
 
 
-def _format(name: str, gl: int, components: int, size: int, family: Family) -> Format:
-    view_class = name if family.startswith("depth") else f"{8 * size}-bit"
-    return Format(name, gl, components, size, family, view_class, srgb=name.startswith("srgb"))
-
-
-FORMATS: dict[str, Format] = {row[0]: _format(*row) for row in _FORMAT_ROWS}
+FORMATS: dict[str, Format] = {found.name: found for found in _formats()}
 
 
 class Semantic(Struct, frozen=True):
