@@ -183,8 +183,8 @@ def walk(times: Doubles) -> dict[int, Doubles]:
         step = turn + 2 * np.pi * phase
         reach = (0.42 if hangs_on == CHEST else 0.5) * np.sin(step)
         lift = np.maximum(np.cos(step), 0.0) ** 1.5  # while the leg swings forwards
-        rotations[len(SPINE) + 2 * number] = product(about(1, -side * reach), about(2, side * 0.3 * lift))
-        rotations[len(SPINE) + 2 * number + 1] = product(about(1, side * 0.4 * reach), about(2, side * 0.35 * lift))
+        rotations[len(SPINE) + 2 * number] = product(about(1, -side * reach), about(2, side * 0.2 * lift))
+        rotations[len(SPINE) + 2 * number + 1] = product(about(1, side * 0.4 * reach), about(2, side * 0.22 * lift))
     return rotations
 
 
