@@ -27,7 +27,7 @@ __getattr__, __dir__ = lazy_exports(__name__, {"installation": ("examine",), "pr
 def mitsuba_or_other(selection: Selection) -> Selection:
     """Return the selection of Mitsuba's pipeline for `mitsuba`, which no file has; others as they are.
 
-    Parameters of its node may follow: `mitsuba:max_bounces=2,diffuse=shared`.
+    Parameters of its node may follow: `mitsuba:max_bounces=2,diffuse_lobe=fresnel`.
 
     Raises:
         UsageError: Mitsuba, or what it needs, is not installed.

@@ -43,7 +43,7 @@ class Tracer:
 
     Args:
         bounces: 0 for light that reaches what the camera sees directly.
-        shared: diffuse reflection is what the specular one leaves (`diffuse: shared` of lighting nodes).
+        shared: diffuse reflection is multiplied by 1 - F of the dielectric (glTF 2.0, appendix B).
         ambient: constant radiance from all sides that the camera does not see, for scenes without an environment.
         shadows: False lets punctual lights through everything.
         jitter: samples fill the pixel; False takes all in its middle.

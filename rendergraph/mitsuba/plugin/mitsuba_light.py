@@ -29,7 +29,9 @@ class MitsubaLight(Node):
     samples: int = param(default=16, min=1, max=4096, doc="Samples of each pixel in a frame.")
     max_bounces: int = param(default=4, min=0, max=64, doc="Reflections between surfaces; 0 is direct light only.")
     ambient: float = param(default=0.03, min=0, doc="Radiance from all sides, for scenes without an environment.")
-    diffuse: Literal["lambert", "shared"] = structural(default="lambert", doc="As of lighting nodes.")
+    diffuse_lobe: Literal["lambert", "fresnel"] = structural(
+        default="lambert", doc="Diffuse lobe: of all the light, or times 1 - F (glTF 2.0, appendix B)."
+    )
 
     def record(self, steps: Steps) -> None:
         """Record the copy into textures."""
@@ -46,7 +48,7 @@ class MitsubaLight(Node):
         """Take the samples of a frame, and upload the mean of all so far."""
         if frame.changed() or self not in _TRACERS:
             scene: Any = frame.scene
-            options: Any = {"bounces": self.max_bounces, "shared": self.diffuse == "shared"}
+            options: Any = {"bounces": self.max_bounces, "shared": self.diffuse_lobe == "fresnel"}
             _TRACERS[self] = Tracer(scene.scene, frame.camera, ambient=(self.ambient,) * 3, **options), 0
         tracer, taken = _TRACERS[self]
         taken += self.samples
