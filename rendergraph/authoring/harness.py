@@ -14,23 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rendergraph.api import Any as AnyTexel
-from rendergraph.api import (
-    Depth,
-    Frame,
-    Function,
-    InOut,
-    Input,
-    Node,
-    Output,
-    Port,
-    Radiance,
-    Semantic,
-    Signature,
-    Steps,
-    View,
-    Views,
-)
+from rendergraph import api
 from rendergraph.authoring.variants import NodeVariant
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.ports import Samples
@@ -64,7 +48,7 @@ class HarnessGraph:
 
     def __post_init__(self) -> None:
         for name, port in self.checked.cls.inputs().items():
-            if isinstance(port, Input) and port.takes_scene:
+            if isinstance(port, api.Input) and port.takes_scene:
                 continue  # the scene is its source
             samples = _samples(port)
             single: Samples = 4 if samples == "multi" else 1
@@ -82,7 +66,7 @@ class HarnessGraph:
         ports = self.checked.cls.inputs()
         return [name for name in self.sources if ports[name].kind in TEXTURE_KINDS and _samples(ports[name]) != "multi"]
 
-    def _type(self, word: str, name: str, cls: type[Node]) -> NodeType:
+    def _type(self, word: str, name: str, cls: type[api.Node]) -> NodeType:
         return NodeType(f"check_{word}_{name}", "", cls, Path(__file__), self.folder, "check-node")
 
     def catalog(self) -> Catalog:
@@ -103,7 +87,7 @@ class HarnessGraph:
             source = self.multisampled[name] if several else source
             nodes[source.name] = {"type": source.name}
             link = f"{source.name}.made"
-            inputs[name] = [link] if isinstance(port, Input) and port.many else link
+            inputs[name] = [link] if isinstance(port, api.Input) and port.many else link
             if name in self.fed and not several:
                 outputs[_FROM + name] = link
         if variant.outputs:
@@ -130,36 +114,36 @@ class HarnessGraph:
 # --- sources ---------------------------------------------------------------------------------------------------------
 
 
-def _samples(port: Input | InOut) -> str:
-    return port.samples if isinstance(port, Input) else "single"
+def _samples(port: api.Input | api.InOut) -> str:
+    return port.samples if isinstance(port, api.Input) else "single"
 
 
-def _source(name: str, port: Input | InOut, folder: Path, samples: Samples) -> type[Node]:
+def _source(name: str, port: api.Input | api.InOut, folder: Path, samples: Samples) -> type[api.Node]:
     semantic = port.semantic
-    if isinstance(semantic, Signature):
+    if isinstance(semantic, api.Signature):
         return _function_source(semantic, folder)
     if port.kind == "view":
-        return _node("Seen", made=Views(doc="The camera's view."), update=_camera("made"))
+        return _node("Seen", made=api.Views(doc="The camera's view."), update=_camera("made"))
     if port.kind == "buffer":
-        made = Output(AnyTexel, kind="buffer", bytes=_BUFFER_BYTES, doc="Zeros.")
+        made = api.Output(api.Any, kind="buffer", bytes=_BUFFER_BYTES, doc="Zeros.")
         return _node("Zeros", made=made, record=lambda self, steps: steps.clear(self.made))
     assert port.kind != "function"  # whose semantic is a signature
     assert port.kind != "scene"  # which is its own source
-    meaning = Radiance if semantic is None or semantic.name == "any" else semantic
-    given = port.format if isinstance(port, InOut) and isinstance(port.format, str) else None
-    image = isinstance(port, Input) and port.use == "image"
+    meaning = api.Radiance if semantic is None or semantic.name == "any" else semantic
+    given = port.format if isinstance(port, api.InOut) and isinstance(port.format, str) else None
+    image = isinstance(port, api.Input) and port.use == "image"
     depth = meaning.name in _DEPTHS or (given is not None and FORMATS[given].is_depth)
     format = given or ("depth32f" if depth else "rgba16f" if image else "rgba32f")
     layers = {"texture2d": 1, "texture_cube": 6}.get(port.kind, 1 if _has_lights(meaning) else 2)
     shader = f"feed_{name}.frag"
     (folder / shader).write_text(_pattern(meaning, format), encoding="utf-8")
 
-    def record(self: Any, steps: Steps) -> None:
+    def record(self: Any, steps: api.Steps) -> None:
         targets = [self.made] if port.kind == "texture2d" else [self.made.layer(layer) for layer in range(layers)]
         for target in targets:
             steps.fullscreen(shader, out={"made": target})
 
-    made = Output(
+    made = api.Output(
         meaning,
         kind=port.kind,
         format=format,
@@ -170,15 +154,15 @@ def _source(name: str, port: Input | InOut, folder: Path, samples: Samples) -> t
         lights=(lambda node, facts: (0,)) if _has_lights(meaning) else None,
         doc="A pattern.",
     )
-    views = Views(count=layers, public=False, doc="The camera's view for each layer.")
+    views = api.Views(count=layers, public=False, doc="The camera's view for each layer.")
     return _node("Pattern", made=made, views=views, record=record, update=_camera("views", layers))
 
 
-def _has_lights(semantic: Semantic) -> bool:
+def _has_lights(semantic: api.Semantic) -> bool:
     return semantic.name in ("shadow_map", "visibility")
 
 
-def _pattern(semantic: Semantic, format: str) -> str:
+def _pattern(semantic: api.Semantic, format: str) -> str:
     value = _VALUES.get(semantic.name, _ANY_VALUE)
     head = "in vec2 v_uv;\n"
     body = "vec2 at = v_uv; float wave = 0.5 + 0.5 * sin(11.0 * at.x + 7.0 * at.y);"
@@ -191,21 +175,21 @@ def _pattern(semantic: Semantic, format: str) -> str:
 
 
 def _camera(port: str, count: int = 1) -> Any:
-    def update(self: Any, frame: Frame) -> None:
+    def update(self: Any, frame: api.Frame) -> None:
         frame.set_views(getattr(self, port), [frame.camera] * count)
 
     return update
 
 
-def _function_source(signature: Signature, folder: Path) -> type[Node]:
+def _function_source(signature: api.Signature, folder: Path) -> type[api.Node]:
     """Return a node whose function is neutral where a texture can replace it, and else varies with each argument."""
     shader = f"{signature.name}_fed.glsl"
     lines = [f"{each.declaration} {{ return {_varied(each)}; }}\n" for each in signature.functions]
     (folder / shader).write_text("".join(lines), encoding="utf-8")
-    return _node("Called", made=Function(signature, shader=shader, doc="A pattern."))
+    return _node("Called", made=api.Function(signature, shader=shader, doc="A pattern."))
 
 
-def _varied(signature: Signature) -> str:
+def _varied(signature: api.Signature) -> str:
     kind, value = signature.declaration.split()[0], signature.neutral
     if signature.texture is None and kind.startswith(("vec", "float")):
         arguments = re.findall(r"(\w+)\s+(\w+)\s*[,)]", signature.declaration)
@@ -218,21 +202,21 @@ def _varied(signature: Signature) -> str:
 # --- readers ---------------------------------------------------------------------------------------------------------
 
 
-def _reader(name: str, port: Port, folder: Path) -> type[Node] | None:
+def _reader(name: str, port: api.Port, folder: Path) -> type[api.Node] | None:
     """Return the class of a node that turns an output into a texture; None where it is one."""
-    value = Output(AnyTexel, format="rgba32f", doc="The values.")
-    if isinstance(port, Function):
+    value = api.Output(api.Any, format="rgba32f", doc="The values.")
+    if isinstance(port, api.Function):
         shader = f"use_{name}.frag"
         (folder / shader).write_text(_call(port.signature), encoding="utf-8")
         many = port.signature.combine != ""
-        read = Input(port.signature, kind="function", many=many, doc="The function.")
+        read = api.Input(port.signature, kind="function", many=many, doc="The function.")
         return _node("Caller", read=read, made=value, shader=shader)
-    if isinstance(port, Views):
-        seen = Input(View, kind="view", doc="The view.")
-        depth = Output(Depth, format="depth32f", clear=0.0, doc="The scene's depth.")
+    if isinstance(port, api.Views):
+        seen = api.Input(api.View, kind="view", doc="The view.")
+        depth = api.Output(api.Depth, format="depth32f", clear=0.0, doc="The scene's depth.")
         return _node("Drawer", read=seen, made=depth, record=_draw)
     if getattr(port, "samples", None) not in (None, 1):
-        read = Input(AnyTexel, samples="any", doc="The texture.")
+        read = api.Input(api.Any, samples="any", doc="The texture.")
         text = "uniform SAMPLER read;\nout vec4 made;\n"
         text += "void main() { made = vec4(texelFetch(read, ivec2(gl_FragCoord.xy), 0)); }\n"
         (folder / "use_samples.frag").write_text(text, encoding="utf-8")
@@ -243,29 +227,29 @@ def _reader(name: str, port: Port, folder: Path) -> type[Node] | None:
             "void main() { made = vec4(words[uint(gl_FragCoord.x) % uint(words.length())]); }\n",
             encoding="utf-8",
         )
-        semantic = getattr(port, "semantic", None) or AnyTexel
-        read = Input(semantic, kind="buffer", doc="The texture.")
+        semantic = getattr(port, "semantic", None) or api.Any
+        read = api.Input(semantic, kind="buffer", doc="The texture.")
         return _node("Words", read=read, made=value, shader="use_buffer.frag")
     return None
 
 
-def _first_sample(self: Any, steps: Steps) -> None:
+def _first_sample(self: Any, steps: api.Steps) -> None:
     desc = steps.desc(self.read)
     assert isinstance(desc, TextureDesc)
     kind = {"uint": "usampler2D", "int": "isampler2D"}.get(FORMATS[desc.format].family, "sampler2D")
     steps.fullscreen("use_samples.frag", defines={"SAMPLER": kind + ("MS" if desc.samples > 1 else "")})
 
 
-def _draw(self: Any, steps: Steps) -> None:
+def _draw(self: Any, steps: api.Steps) -> None:
     steps.geometry(None, vertex="<depth.vert>", out=self.made, view=self.read, materials="none")
 
 
-def _call(signature: Signature) -> str:
+def _call(signature: api.Signature) -> str:
     body = "vec4 at = fract(gl_FragCoord.xyxy * vec4(0.037, 0.041, 0.043, 0.047)) + 0.1; made = vec4(0.0);"
     return f"out vec4 made;\nvoid main() {{ {body} {' '.join(map(_added, signature.functions))} }}\n"
 
 
-def _added(signature: Signature) -> str:
+def _added(signature: api.Signature) -> str:
     arguments = signature.declaration.partition("(")[2].rpartition(")")[0]
     kinds = [argument.split()[-2] for argument in arguments.split(",") if argument.strip()]
     pattern = {"float": "at.x", "bool": "at.x > 0.5"} | {f"vec{count}": f"vec{count}(at)" for count in (2, 3, 4)}
@@ -276,6 +260,6 @@ def _added(signature: Signature) -> str:
     return f"{{ {result} result = {signature.name}({values}); made += {value}; }}"
 
 
-def _node(name: str, *, shader: str | None = None, **attributes: Any) -> type[Node]:
+def _node(name: str, *, shader: str | None = None, **attributes: Any) -> type[api.Node]:
     body = {"__module__": __name__, "__doc__": "Part of a check.", "shader": shader, **attributes}
-    return types.new_class(name, (Node,), exec_body=lambda space: space.update(body))
+    return types.new_class(name, (api.Node,), exec_body=lambda space: space.update(body))

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 @options.pipeline_options
 @click.option("-n", "--frames", type=click.IntRange(1, 100_000), default=30, show_default=True, help="Measured frames.")
 @click.option("--fps", type=options.POSITIVE, default=30.0, show_default=True, help="Frames a second.")
-@click.option("--no-alias", is_flag=True, help="Give every texture memory of its own.")
+@options.alias_option
 @options.heap_option
 @click.option("--steps", is_flag=True, help="Time each step of a pass, too.")
 @options.json_option
@@ -26,12 +26,10 @@ if TYPE_CHECKING:
 def command(
     selection: Selection,
     frames: int,
-    fps: float,
-    no_alias: bool,
-    heap: bool,
     steps: bool,
     as_json: bool,
     device: int | None,
+    **modes: Any,
 ) -> None:
     """Time each pass.
 
@@ -49,9 +47,7 @@ def command(
 
     linked = stages.link(stages.resolve(selection))
     warn(linked.warnings)
-    expanded = stages.expand(
-        linked, RenderOptions(range(1, frames + 1), fps, alias=not no_alias, heap=heap, timed=True)
-    )
+    expanded = stages.expand(linked, RenderOptions(range(1, frames + 1), timed=True, **modes))
     with Gpu(device) as gpu:
         frame = stages.draw_last(expanded, gpu)
     warn(frame.warnings)

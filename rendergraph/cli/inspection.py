@@ -86,9 +86,7 @@ def check(selection: Selection, as_json: bool, profile: str | None) -> None:
 @options.heap_option
 @click.option("--shuffle", type=int, metavar="SEED", help="Use another legal order.")
 @click.option("--every-step", is_flag=True, help="Give each step that makes a kept value a row of its own.")
-def plan(
-    selection: Selection, as_json: bool, no_alias: bool, heap: bool, shuffle: int | None, every_step: bool
-) -> None:
+def plan(selection: Selection, as_json: bool, every_step: bool, **modes: Any) -> None:
     """Show order, lifetimes and memory, with reasons.
 
     Lists the order of the steps, how long each texture lives, which textures share memory, and the bytes. Steps that
@@ -103,9 +101,8 @@ def plan(
     from rendergraph.scene.scene_data import posing_figures
     from rendergraph.session import RenderOptions, stages
 
-    render_options = RenderOptions(alias=not no_alias, heap=heap, shuffle=shuffle)
     linked = options.link(selection)
-    plan, posing = stages.plan(stages.expand(linked, render_options)).plan, posing_figures(linked.scene)
+    plan, posing = stages.plan(stages.expand(linked, RenderOptions(**modes))).plan, posing_figures(linked.scene)
     if as_json:
         emit_json(diagrams.plan_json(plan) | ({"posing": posing} if posing["meshes"] else {}))
         return

@@ -191,7 +191,9 @@ def together(*decorators: Callable[[Any], Any]) -> Callable[[F], F]:
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document.")
-alias_option = click.option("--no-alias", is_flag=True, help="Give every texture its own memory.")
+alias_option = click.option(
+    "--no-alias", "alias", is_flag=True, flag_value=False, default=True, help="Give every texture its own memory."
+)
 heap_option = click.option(
     "--heap", is_flag=True, help="Let textures of any size and format share memory, where the device supports it."
 )

@@ -53,7 +53,14 @@ if TYPE_CHECKING:
     default=None,
     help="Skip steps whose results are unchanged since the previous frame.  [default: unless --json, which times them]",
 )
-@click.option("--no-cull", is_flag=True, help="Draw objects outside the view frustum, too.")
+@click.option(
+    "--no-cull",
+    "cull",
+    is_flag=True,
+    flag_value=False,
+    default=True,
+    help="Draw objects outside the view frustum too.",
+)
 @options.alias_option
 @options.heap_option
 @click.option("--poison", is_flag=True, help="Overwrite textures after their last use, to reveal later reads.")
@@ -71,12 +78,7 @@ def command(
     as_json: bool,
     device: int | None,
     watch: bool,
-    reuse: bool | None,
-    no_cull: bool,
-    no_alias: bool,
-    heap: bool,
-    poison: bool,
-    shuffle: int | None,
+    **modes: Any,
 ) -> None:
     """Render a pipeline to picture files.
 
@@ -100,8 +102,7 @@ def command(
     from rendergraph.session.gpu import Gpu
 
     def render_options(linked: Linked) -> RenderOptions:
-        base = RenderOptions(frames or linked.frames, fps or linked.fps, timed=as_json, reuse=reuse)
-        return replace(base, cull=not no_cull, alias=not no_alias, heap=heap, poison=poison, shuffle=shuffle)
+        return RenderOptions(frames or linked.frames, fps or linked.fps, timed=as_json, **modes)
 
     warnings = Warnings()
     read = partial(_read, selection, render_options, outputs, taps, tap_all, warnings)
