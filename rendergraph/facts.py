@@ -94,7 +94,7 @@ class ObjectFacts(Struct, frozen=True, eq=False):
 
     Attributes:
         triangles, vertices: counts of its mesh.
-        blended: its material is blended with what is behind it (`alpha_mode: blend`).
+        blended: what is behind it is seen through its material, by alpha or as it transmits light.
         double_sided: its material is visible from both sides.
         hidden: only steps that name it draw it.
         grain: its material is anisotropic (`anisotropy_strength`) in some frame.
@@ -102,6 +102,7 @@ class ObjectFacts(Struct, frozen=True, eq=False):
         reflective: its material reflects other than 4 % at normal incidence where it is not metal, in some frame.
         mesh: the name of its mesh.
         extra: values of plugins' keys, see `SceneKey.of`.
+        layers: those of its material in some frame: `clearcoat`, `sheen`, `iridescence`, `transmission`.
     """
 
     name: str
@@ -119,6 +120,7 @@ class ObjectFacts(Struct, frozen=True, eq=False):
     _plane: Callable[[], object] = lambda: None
     _convex: Callable[[], bool] = bool
     extra: Extra = NO_EXTRA
+    layers: tuple[str, ...] = ()
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, ObjectFacts) and self._compared == other._compared
@@ -127,13 +129,17 @@ class ObjectFacts(Struct, frozen=True, eq=False):
         return hash(self._compared)
 
     def __repr__(self) -> str:
-        names = [name for name in self.__struct_fields__ if name[0] != "_" and (name != "extra" or self.extra)]
+        names = [
+            name
+            for name in self.__struct_fields__
+            if name[0] != "_" and (name not in ("extra", "layers") or getattr(self, name))
+        ]
         known = (f"{name}={getattr(self, name)!r}" for name in names)
         return f"ObjectFacts({', '.join(known)})"
 
     @property
     def _compared(self) -> tuple[object, ...]:
-        return *astuple(self)[:-5], self.extra  # all but the mesh and what is asked of it
+        return *astuple(self)[:-6], self.extra, self.layers  # all but the mesh and what is asked of it
 
     @property
     def closed(self) -> bool:

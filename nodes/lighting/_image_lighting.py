@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from rendergraph.api import Depth, Facts, Input, Port, Steps, param
+from rendergraph.api import Depth, Facts, Input, Port, State, Steps, param
 
 from ..geometry._surface_textures import SURFACE_TEXTURES
 from ._lighting import Color, SurfaceLighting, draws_backdrop
@@ -73,8 +73,26 @@ class ImageLighting(SurfaceLighting):
         """Return the macro of a step that leaves the background to a backdrop."""
         return {"BACKDROP": 1} if draws_backdrop(self, steps.facts) else {}
 
+    def draw_layered(self, steps: Steps) -> None:
+        """Light again the opaque surfaces that have layers, such as a coat: a G-buffer has none."""
+        objects = [one.name for one in steps.facts.objects if one.layers and not one.blended and not one.hidden]
+        if not objects or not {"phong", "nothing"}.isdisjoint(steps.needs("shading")):
+            return
+        reads = self.direct_reads(steps) | self.ambient_reads(steps) | self.air_reads(steps) | self.energy_reads(steps)
+        steps.geometry(
+            "forward_lighting.frag",
+            out=self.color_targets(steps),
+            objects=objects,
+            view=self.depth,
+            state=State(depth_write=False),
+            label="layered",
+            depth=self.depth.tested(),
+            **reads | self.layer_reads(steps),
+        )
+
     def draw_backdrop_and_transparent(self, steps: Steps) -> None:
-        """Draw the environment behind the lit surfaces, then transparent surfaces over both, with the depth's view."""
+        """Draw layers, the environment behind the lit surfaces, then transparent surfaces, with the depth's view."""
+        self.draw_layered(steps)
         self.draw_backdrop(steps, view=self.depth)
         if self.blended:
             self.draw_transparent(

@@ -17,6 +17,7 @@ from rendergraph.api import (
     Irradiance,
     LightList,
     Node,
+    ObjectFacts,
     Occlusion,
     Output,
     Part,
@@ -39,6 +40,13 @@ from ..geometry._samples import Samples
 
 UNDER = Blend("one_minus_dst_alpha", "one")
 Color = float | tuple[float, float, float]
+
+
+def has_layer(facts: Facts, *layers: str) -> bool:
+    """Return whether a material of an object that is drawn has one of these layers."""
+    return any(layer in placed.layers for placed in facts.objects if not placed.hidden for layer in layers)
+
+
 _OLD_METHODS = {
     "around": "environment_reads",
     "ambient_light": "ambient_reads",
@@ -78,10 +86,16 @@ class Lighting(Node):
         doc="Lists of the lights that may reach a position; unconnected, every surface is lit by all lights.",
     )
     brdf_table = Internal(
-        format="rg16",
+        format=lambda node, facts: "rgba16" if has_layer(facts, "sheen") else "rg16",
         size=(64, 64),
         kept=True,
         doc="Split-sum BRDF factors of f0 and f90, over sqrt(N·V) and roughness.",
+    )
+
+    behind = Internal(
+        format="rgba16f",
+        mips=0,
+        doc="The picture without the surfaces that transmit light, and its mean over ever larger blocks.",
     )
 
     shading: Literal["unlit", "phong", "blinn_phong", "anisotropic", "pbr"] | str = define(
@@ -135,8 +149,10 @@ class Lighting(Node):
 
     def record(self, steps: Steps) -> None:
         """Record the BRDF table, if surfaces reflect an environment."""
-        if "brdf_table" in self.ambient_reads(steps) | self.energy_reads(steps):
-            steps.fullscreen("brdf_table.frag", out=self.brdf_table, defines={"TABLE_SAMPLES": 512}, label="table")
+        if "brdf_table" in self.ambient_reads(steps) | self.energy_reads(steps) | self.layer_reads(steps):
+            sheen = {"SHEEN_TABLE": 1} if has_layer(steps.facts, "sheen") else {}
+            defines = {"TABLE_SAMPLES": 512, **sheen}
+            steps.fullscreen("brdf_table.frag", out=self.brdf_table, defines=defines, label="table")
 
     def environment_reads(self, steps: Steps) -> dict[str, Any]:
         """Return what a shader reads for environment lighting; nothing if it would not contribute."""
@@ -157,6 +173,20 @@ class Lighting(Node):
         shares = self.diffuse_lobe == "shared" and "phong" not in needs and "nothing" not in needs
         return {"brdf_table": self.brdf_table.sampled("linear")} if shares else {}
 
+    def layer_reads(self, steps: Steps) -> dict[str, Any]:
+        """Return what a shader reads to light the layers of materials: the albedo of sheen."""
+        needs = steps.needs("shading")
+        is_physical = "phong" not in needs and "nothing" not in needs
+        reads = is_physical and has_layer(steps.facts, "sheen")
+        return {"brdf_table": self.brdf_table.sampled("linear")} if reads else {}
+
+    def copy_behind(self, steps: Steps, picture: Port) -> None:
+        """Copy the picture to `behind`, with all levels."""
+        steps.fullscreen("copy_picture.frag", radiance=picture, out=self.behind.mip(0), label="behind")
+        for level in range(1, steps.desc(self.behind).mips):
+            target = self.behind.mip(level)
+            steps.fullscreen("<downsample.frag>", source=self.behind.mip(level - 1), out=target, label="behind")
+
     def air_reads(self, steps: Steps) -> dict[str, Any]:
         """Return what a shader reads for the air in front of what it draws."""
         return {"air": self.air} if steps.connected(self.air) else {}
@@ -171,6 +201,7 @@ class Lighting(Node):
         This is the environment, the air, shadow functions and lists of lights.
         """
         reads = self.environment_reads(steps) | self.energy_reads(steps) | self.air_reads(steps)
+        reads |= self.layer_reads(steps)
         return reads | ({"lookup": shadows, **self.light_list_reads(steps)} if self.wants_lights(steps) else {})
 
     def draw_transparent(
@@ -195,21 +226,48 @@ class Lighting(Node):
             depth: depth to test against, if `out` has none.
             view: a port that carries the view; by default the node's `view` input or the camera.
             fragment, vertex, geometry, in_place: shaders, and whether they leave objects in place.
+
+        Surfaces that transmit light are drawn first, with their depth. They read a copy of the picture without them.
         """
         reads: dict[str, Any] = self.lighting_reads(steps, shadows) | ({} if depth is None else {"depth": depth})
         reads = reads or {"lookup": shadows}  # a step without reads would read all inputs
+        objects: str | list[str] = "transparent"
+        through = [placed.name for placed in steps.facts.objects if transmits(placed)]
+        if through and "phong" not in steps.needs("shading") and "nothing" not in steps.needs("shading"):
+            objects = [one.name for one in steps.facts.objects if one.blended and not one.hidden and not transmits(one)]
+            self.copy_behind(steps, out["radiance"])
+            table = {"brdf_table": self.brdf_table.sampled("linear")} if self.environment_reads(steps) else {}
+            steps.geometry(
+                fragment,
+                vertex=vertex,
+                geometry=geometry,
+                in_place=in_place,
+                out=out,
+                objects=through,
+                view=view,
+                defines={"TRANSMITS": 1},
+                label="transmissive",
+                **reads | table | {"behind": self.behind.sampled("trilinear")},
+            )
+            if not objects:
+                return
         steps.geometry(
             fragment,
             vertex=vertex,
             geometry=geometry,
             in_place=in_place,
             out=out,
-            objects="transparent",
+            objects=objects,
             order="back_to_front",
             view=view,
             state=State(blend=PREMULTIPLIED, depth_write=False),
             **reads,
         )
+
+
+def transmits(placed: ObjectFacts) -> bool:
+    """Return whether an object is drawn, and light passes through it."""
+    return "transmission" in placed.layers and not placed.hidden
 
 
 PARTS = ("direct_diffuse", "direct_specular", "environment_reflection", "specular_albedo", "irradiance")
@@ -416,7 +474,10 @@ class GeometryLighting(SurfaceLighting):
         """
         connected = [port for port in (self.depth, self.visibility, self.occlusion) if steps.connected(port)]
         reads: dict[str, Any] = (
-            {port.name: port for port in connected} | self.air_reads(steps) | self.energy_reads(steps)
+            {port.name: port for port in connected}
+            | self.air_reads(steps)
+            | self.energy_reads(steps)
+            | self.layer_reads(steps)
         )
         if options.get("per_light") is None:
             reads |= self.light_list_reads(steps)

@@ -12,8 +12,9 @@ class DeferredLighting(ImageLighting):
     """Light the surfaces of a G-buffer by all lights of the scene, in one full-screen pass.
 
     Each pixel is shaded once, regardless of the depth complexity: the cost is that of the geometry plus pixels times
-    lights. A G-buffer contains no transparent surfaces; they are drawn over the picture, back to front. The picture is
-    the same as that of `forward_lighting`.
+    lights. A G-buffer contains no transparent surfaces; they are drawn over the picture, back to front. It contains no
+    layers either: surfaces with a coat, sheen or iridescence are drawn once more, as by `forward_lighting`. The picture
+    is the same as that of `forward_lighting`.
     """
 
     radiance = Output(

@@ -91,6 +91,10 @@ def scene_macros(scene: Scene, packed: PackedScene, stored: Collection[str]) -> 
         same = (table["specular"] == default["specular"]).all() and (table["extra"] == default["extra"])[:, 0].all()
         if same and not textured & {"specular", "specular_color"}:
             macros["DEFAULT_SPECULAR"] = "1"
+    if packed.materials.dtype == pack.LAYERED_MATERIAL:
+        macros["LAYERED_MATERIALS"] = "1"
+    if (slots := pack.slot_count(scene.materials)) > 8:
+        macros["MATERIAL_SLOTS"] = str(slots)
     if "material_block" in stored:
         macros["MATERIAL_STORAGE"] = "1"
     if "material_uv_block" in stored:
@@ -153,6 +157,8 @@ def features(scene: Scene, index: int, level: str) -> tuple[dict[str, str], dict
             defines["UNLIT"] = "1"
         if scene.has_grain(material):
             defines["ANISOTROPIC"] = "1"
-        if mesh.tangents is not None and ("normal" in slots or scene.has_grain(material)):
+        defines |= {f"HAS_{layer.upper()}": "1" for layer in scene.layers(material)}
+        bumpy = "normal" in slots or "clearcoat_normal" in slots
+        if mesh.tangents is not None and (bumpy or scene.has_grain(material)):
             defines["HAS_TANGENT"] = "1"
     return defines, found

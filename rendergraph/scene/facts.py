@@ -36,7 +36,7 @@ def selected(scene: Scene, name: str) -> list[int]:
     return [
         number
         for number, placed in enumerate(scene.objects)
-        if not placed.hidden and takes(placed.casts_shadow, scene.materials[placed.material].alpha_mode == "blend")
+        if not placed.hidden and takes(placed.casts_shadow, scene.is_blended(scene.materials[placed.material]))
     ]
 
 
@@ -50,7 +50,7 @@ def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
                 len(mesh.indices),
                 len(mesh.positions),
                 placed.casts_shadow,
-                material.alpha_mode == "blend",
+                scene.is_blended(material),
                 material.double_sided,
                 placed.hidden,
                 scene.has_grain(material),
@@ -61,6 +61,7 @@ def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
                 partial(attrgetter("plane"), mesh),
                 partial(attrgetter("convex"), mesh),
                 placed.extra,
+                scene.layers(material),
             )
         )
     return tuple(facts)

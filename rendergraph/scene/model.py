@@ -38,6 +38,7 @@ T = TypeVar("T", bound=np.floating[Any])
 FARTHEST = 1e12
 """No number of a mesh is larger: products of a few would leave single precision."""
 
+_LAYERS = {key: key.removesuffix("_color") for key in ("clearcoat", "sheen_color", "iridescence", "transmission")}
 _REFLECTANCE = ("ior", "specular", "specular_color")
 _MOST_CONVEX = 10_000_000
 """Pairs of vertex and triangle that are looked at to see whether a mesh is convex: about a tenth of a second."""
@@ -209,8 +210,11 @@ class Material(Struct, frozen=True):
         ior: index of refraction; dielectric f0 is ((ior-1)/(ior+1))².
         specular, specular_color: as in KHR_materials_specular, linear RGB.
         anisotropy_strength, anisotropy_rotation: as in KHR_materials_anisotropy, radians.
+        clearcoat, sheen_color, iridescence, transmission: factors of the layers, with what belongs to each, as in the
+            KHR_materials_ extensions; distances in metres, `iridescence_thickness` in nanometres where its texture
+            is 0 and 1 (without one the second counts).
         textures: by slot: `base_color`, `metallic_roughness`, `normal`, `occlusion`, `emissive`, `anisotropy`,
-            `specular`, `specular_color`.
+            `specular`, `specular_color`, and those of the layers.
         ambient, diffuse, specular_phong, shininess: an OBJ's Ka, Kd, Ks, Ns where the MTL gives no Pr/Pm; None where
             the material is metallic-roughness (design.md §8 says how one is derived from the other).
         extra: values of plugins' keys, also of objects, lights and cameras.
@@ -232,6 +236,19 @@ class Material(Struct, frozen=True):
     specular_color: Vec3 = (1.0, 1.0, 1.0)
     anisotropy_strength: float = 0.0
     anisotropy_rotation: float = 0.0
+    clearcoat: float = 0.0
+    clearcoat_roughness: float = 0.0
+    clearcoat_normal_scale: float = 1.0
+    sheen_color: Vec3 = (0.0, 0.0, 0.0)
+    sheen_roughness: float = 0.0
+    iridescence: float = 0.0
+    iridescence_ior: float = 1.3
+    iridescence_thickness: tuple[float, float] = (100.0, 400.0)
+    transmission: float = 0.0
+    thickness: float = 0.0
+    attenuation_distance: float = float("inf")
+    attenuation_color: Vec3 = (1.0, 1.0, 1.0)
+    dispersion: float = 0.0
     textures: Mapping[str, Texture] = field(default_factory=dict)
     ambient: Vec3 | None = None
     diffuse: Vec3 | None = None
@@ -410,6 +427,15 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
     def has_grain(self, material: Material) -> bool:
         """Whether a material is anisotropic at any time."""
         return material.anisotropy_strength > 0 or self._changes(material, "anisotropy_strength")
+
+    def layers(self, material: Material) -> tuple[str, ...]:
+        """Return which of clearcoat, sheen, iridescence and transmission a material has at any time."""
+        has = {key: np.any(getattr(material, key)) or self._changes(material, key) for key in _LAYERS}
+        return () if material.unlit else tuple(_LAYERS[key] for key in _LAYERS if has[key])
+
+    def is_blended(self, material: Material) -> bool:
+        """Whether opaque surfaces are seen through a material: by its alpha, or as it transmits light."""
+        return material.alpha_mode == "blend" or "transmission" in self.layers(material)
 
     def emits(self, material: Material) -> bool:
         """Whether a material emits light at any time."""

@@ -1,7 +1,7 @@
 """A scene as arrays for the GPU, packed once: geometry streams, instance records, materials, lights and views.
 
 Layouts are those of the GLSL structs in `shaders/include/` (std140: everything is a vec4 or a mat4 by columns). Bytes:
-`View` 448, `Light` 64, `MaterialData` 128, an instance record 56.
+`View` 448, `Light` 64, `MaterialData` 128 (208 with layers), an instance record 56.
 """
 
 from __future__ import annotations
@@ -29,8 +29,10 @@ Doubles: TypeAlias = npt.NDArray[np.float64]
 SLOTS = (
     *("base_color", "metallic_roughness", "normal", "occlusion"),
     *("emissive", "anisotropy", "specular", "specular_color"),
+    *("clearcoat", "clearcoat_roughness", "clearcoat_normal", "sheen_color", "sheen_roughness"),
+    *("iridescence", "iridescence_thickness", "transmission", "thickness"),
 )
-"""Texture slots in the order of a material's rows in `material_uvs`."""
+"""Texture slots in the order of a material's rows in `material_uvs`; those of layers from the ninth on."""
 
 _VEC4 = ("<f4", (4,))
 INSTANCE = np.dtype([("rows", "<f4", (3, 4)), ("ids", "<i4", (2,))])
@@ -45,6 +47,9 @@ MESH = np.dtype(
 """Where a mesh lies in the streams: first index, number of indices, base vertex, number of vertices, its box."""
 _MATERIAL_ROWS = "base_color emissive surface specular extra phong_diffuse phong_specular phong_ambient"
 MATERIAL = np.dtype([(name, *_VEC4) for name in _MATERIAL_ROWS.split()])
+_LAYER_ROWS = "clearcoat sheen iridescence transmission absorption"
+LAYERED_MATERIAL = np.dtype([(name, *_VEC4) for name in (*_MATERIAL_ROWS.split(), *_LAYER_ROWS.split())])
+"""The records of scenes where some material has a layer (`LAYERED_MATERIALS`)."""
 ENVIRONMENT = np.dtype([("environment_transform", *_VEC4)])
 LIGHT = np.dtype([(name, *_VEC4) for name in ("position", "color", "direction", "cone")])
 _MATRICES = "view projection view_projection inverse_view inverse_projection inverse_view_projection"
@@ -69,7 +74,8 @@ class PackedScene(Struct, frozen=True, eq=False):
         indices: uint32 (i,), relative to the mesh's base vertex, three a triangle.
         instances: one an object in the scene's order; a draw of objects that are not neighbours gathers their records
             into its own order.
-        material_uvs: float32 (m, 16, 4): per material the eight `SLOTS`' two rows (a, b, c, 0) of the uv transform.
+        material_uvs: float32 (m, 2 s, 4): per material two rows (a, b, c, 0) of the uv transform for each of the first
+            s `SLOTS`, which `slot_count` tells.
         material_moved: bool (m,), whether any slot's transform is not the identity (`HAS_UV_TRANSFORM`).
         mirrored: bool (n,), the transform turns the winding round (determinant below 0).
         centers, extents: float64 (n, 3), middles and half sides of world-space bounding boxes.
@@ -188,7 +194,8 @@ def _moved(packed: PackedScene, before: Scene, scene: Scene) -> dict[str, Any]:
 
 def _materials(scene: Scene) -> dict[str, Any]:
     uvs, moved = pack_material_uvs(scene.materials)
-    return {"materials": pack_materials(scene.materials), "material_uvs": uvs, "material_moved": moved}
+    layered = any(map(scene.layers, scene.materials))
+    return {"materials": pack_materials(scene.materials, layered), "material_uvs": uvs, "material_moved": moved}
 
 
 def _placed(scene: Scene, meshes: Records) -> dict[str, Any]:
@@ -234,9 +241,14 @@ def _stream(meshes: Sequence[Mesh], orders: Sequence[npt.NDArray[np.int64]], nam
     return stream
 
 
-def pack_materials(materials: Sequence[Material]) -> Records:
-    """`MaterialData` records (shaders/include/materials.glsl)."""
-    table = np.zeros(len(materials), MATERIAL)
+def slot_count(materials: Sequence[Material]) -> int:
+    """Return how many `SLOTS` a scene's tables have: all if a texture of a layer is there, else the first eight."""
+    return len(SLOTS) if any(slot in SLOTS[8:] for material in materials for slot in material.textures) else 8
+
+
+def pack_materials(materials: Sequence[Material], layered: bool = False) -> Records:
+    """`MaterialData` records (shaders/include/materials.glsl), `layered` or without what layers need."""
+    table = np.zeros(len(materials), LAYERED_MATERIAL if layered else MATERIAL)
     for record, material in zip(table, materials, strict=True):
         ambient, diffuse, specular, n = phong_of(material)
         record["base_color"] = material.base_color
@@ -247,12 +259,21 @@ def pack_materials(materials: Sequence[Material]) -> Records:
         record["phong_diffuse"] = (*diffuse, n)
         record["phong_specular"] = (*specular, 0.0)
         record["phong_ambient"] = (*ambient, 0.0)
+        if layered:
+            # Of light that travels a metre, exp(-absorption) is left; black would absorb without end.
+            left = np.maximum(material.attenuation_color, 1e-6)
+            record["clearcoat"] = (material.clearcoat, material.clearcoat_roughness, material.clearcoat_normal_scale, 0)
+            record["sheen"] = (*material.sheen_color, material.sheen_roughness)
+            record["iridescence"] = (material.iridescence, material.iridescence_ior, *material.iridescence_thickness)
+            record["transmission"] = (material.transmission, material.thickness, material.dispersion, material.ior)
+            record["absorption"][:3] = -np.log(left) / material.attenuation_distance
     return table
 
 
 def pack_material_uvs(materials: Sequence[Material]) -> tuple[Floats, Bools]:
     """Two rows (a, b, c, 0) for each slot of each material, `u' = a·u + b·v + c`; and which materials need them."""
-    rows = np.zeros((len(materials), len(SLOTS), 2, 4), np.float32)
+    slots = slot_count(materials)
+    rows = np.zeros((len(materials), slots, 2, 4), np.float32)
     rows[:, :, 0, 0] = rows[:, :, 1, 1] = 1.0
     moved = np.zeros(len(materials), bool)
     for number, material in enumerate(materials):
@@ -260,7 +281,7 @@ def pack_material_uvs(materials: Sequence[Material]) -> tuple[Floats, Bools]:
             if texture.transform is not None:
                 rows[number, SLOTS.index(slot), :, :3] = np.reshape(texture.transform, (2, 3))
                 moved[number] = True
-    return rows.reshape(len(materials), 2 * len(SLOTS), 4), moved
+    return rows.reshape(len(materials), 2 * slots, 4), moved
 
 
 def pack_lights(lights: Sequence[Light]) -> Records:

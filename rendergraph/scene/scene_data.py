@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from rendergraph.facts import SceneDataFacts
 from rendergraph.scene.model import ImageSource, Scene, Texture
-from rendergraph.scene.pack import SLOTS, PackedScene, Records
+from rendergraph.scene.pack import SLOTS, PackedScene, Records, slot_count
 from rendergraph.scene.tree_data import most_bytes, stack_size
 from rendergraph.textures import FORMATS, TextureDesc
 
@@ -117,7 +117,7 @@ def texture_data(scene: Scene, sizes: Mapping[Stored, tuple[int, int]], arrays: 
     They are array (-1 without a texture), layer, `width | height << 16`, and bits: UV set, 2 for an unfiltered
     texture, and from the third and fifth bit on the wrap mode along s and t, 0 to 2 for repeat, mirror and clamp.
     """
-    table = np.full((len(scene.materials), len(SLOTS), 4), (-1, 0, 0, 0), np.int32)
+    table = np.full((len(scene.materials), slot_count(scene.materials), 4), (-1, 0, 0, 0), np.int32)
     for number, material in enumerate(scene.materials):
         for slot, texture in material.textures.items():
             key = stored(texture)
@@ -140,7 +140,7 @@ def scene_data_facts(scene: Scene, rays: bool = False) -> SceneDataFacts:
         bytes=4 * width * vertices
         + INSTANCE_DATA.itemsize * len(scene.objects)
         + EMITTER.itemsize * emitters
-        + 16 * len(SLOTS) * len(scene.materials) * bool(textures.arrays)
+        + 16 * slot_count(scene.materials) * len(scene.materials) * bool(textures.arrays)
         + sum(desc.bytes for desc in textures.arrays)
         + trees,
         trees=trees,

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from rendergraph.scene.rig import Rig
 
 _DEFAULT = Material("default", base_color=(0.8, 0.8, 0.8, 1.0))
-_SRGB = ("base_color", "emissive", "specular_color")
+_SRGB = ("base_color", "emissive", "specular_color", "sheen_color")
 
 
 def read_scene(path: Path, reading: Reading) -> Scene:

@@ -1,4 +1,5 @@
 // Lighting of a surface by the environment, or by the constant ambient light. rendergraph provides `light_from()`.
+#include <layers.glsl>
 #include <shading.glsl>
 
 uniform vec3 ambient;
@@ -30,6 +31,9 @@ vec3 reflection_direction(Surface s) {
 // Fraction of the environment's light in the specular lobe that the surface reflects to the viewer: the second factor
 // of the split sum (Karis 2013). The empirical shading models reflect none.
 vec3 specular_reflectance(Surface s) {
+#ifdef IRIDESCENCE_LAYER
+    s.f0 = s.film_f0;
+#endif
 #ifdef HAS_ENVIRONMENT_BRDF
     return ggx_albedo(s.f0, s.f90, clamp(dot(s.normal, s.view_dir), 0.0, 1.0), s.roughness);
 #else
@@ -46,12 +50,37 @@ vec3 prefiltered_environment(Surface s) {
 #endif
 }
 
+#if defined(HAS_LAYERS) && defined(HAS_ENVIRONMENT_SPECULAR)
+// The environment's light that the layered surface reflects, from what its base reflects: `base`.
+ReflectedLight layered_environment(Surface s, ReflectedLight base) {
+    float NoV = clamp(dot(s.normal, s.view_dir), 0.0, 1.0);
+#ifdef SHEEN_LAYER
+    float albedo = sheen_albedo(s, NoV), left = below_sheen(s, albedo);
+    // The lobe of fibres is about as wide as that of microfacets of the same roughness.
+    vec3 scattered = light_from(reflect(-s.view_dir, s.normal), clamp(s.sheen_roughness, 0.0, 1.0));
+    base.diffuse *= left;
+    base.specular = base.specular * left + s.sheen_color * min(albedo, 1.0) * scattered;
+#endif
+#ifdef CLEARCOAT_LAYER
+    float coat_NoV = clamp(dot(s.clearcoat_normal, s.view_dir), 0.0, 1.0);
+    float coat = s.clearcoat * ggx_albedo(vec3(0.04), 1.0, coat_NoV, s.clearcoat_roughness).r;
+    base.diffuse *= 1.0 - coat;
+    vec3 reflected = light_from(reflect(-s.view_dir, s.clearcoat_normal), clamp(s.clearcoat_roughness, 0.0, 1.0));
+    base.specular = base.specular * (1.0 - coat) + coat * reflected;
+#endif
+    return base;
+}
+#endif
+
 // Light reflected from the environment, or the ambient constant: radiance towards the viewer. The diffuse part is not
 // yet multiplied by the diffuse reflectance. The empirical shading models reflect no specular environment light.
 ReflectedLight environment_lighting(Surface s) {
 #ifndef HAS_ENVIRONMENT
     return ReflectedLight(ambient, vec3(0.0));
 #else
+#ifdef IRIDESCENCE_LAYER
+    s.f0 = s.film_f0;
+#endif
     ReflectedLight light = ReflectedLight(light_from(s.normal, 2.0), vec3(0.0));
 #ifdef HAS_ENVIRONMENT_SPECULAR
     float NoV = clamp(dot(s.normal, s.view_dir), 0.0, 1.0);
@@ -61,6 +90,9 @@ ReflectedLight environment_lighting(Surface s) {
 #if MULTIPLE_SCATTERING
     // Energy compensation for multiple scattering between microfacets (Turquin 2019).
     light.specular *= 1.0 + s.f0 * (1.0 / max(brdf.x + brdf.y, 1e-3) - 1.0);
+#endif
+#ifdef HAS_LAYERS
+    light = layered_environment(s, light);
 #endif
 #if ENVIRONMENT_PART == ENVIRONMENT_PART_TABLE
     light.specular = vec3(brdf, 0.0);

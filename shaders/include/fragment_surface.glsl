@@ -1,6 +1,10 @@
 // The surface of a fragment of the scene's geometry, from varyings, material factors and textures.
+#ifndef NO_LAYERS  // a shader that lights otherwise than per fragment leaves layers out
+#define FRAGMENT_LAYERS
+#endif
 #include <alpha_mask.glsl>
 #include <base_color.glsl>
+#include <fragment_layers.glsl>
 #include <material_surface.glsl>
 
 in vec3 v_position;
@@ -10,7 +14,7 @@ centroid in vec4 v_centroid_position;  // v_position and 1, interpolated at the 
 centroid in vec3 v_normal;
 flat in int v_material;
 
-#if defined(HAS_NORMAL_TEXTURE) || defined(NEEDS_GRAIN)
+#if defined(HAS_NORMAL_TEXTURE) || defined(NEEDS_GRAIN) || defined(HAS_COAT_NORMAL)
 #define NEEDS_TANGENT
 #ifdef HAS_TANGENT
 centroid in vec4 v_tangent;
@@ -37,7 +41,6 @@ uniform sampler2D specular_color_texture;
 #if defined(HAS_ANISOTROPY_TEXTURE) && defined(NEEDS_GRAIN)
 uniform sampler2D anisotropy_texture;
 #endif
-
 #ifdef NEEDS_TANGENT
 #ifndef NORMAL_UV
 #define NORMAL_UV 0
@@ -106,6 +109,9 @@ Surface fragment_surface(View view) {
 #ifdef HAS_EMISSIVE_TEXTURE
     texels.emissive = texture(emissive_texture, slot_uv(v_material, EMISSIVE_SLOT, UV_SET(EMISSIVE_UV))).rgb;
 #endif
+#ifdef HAS_LAYERS
+    LayerTexels layers = LAYER_TEXELS(s, m, v_material);
+#endif
     bool flip_normal = false, lit = true;
 #ifdef DOUBLE_SIDED
     flip_normal = !gl_FrontFacing;
@@ -120,6 +126,9 @@ Surface fragment_surface(View view) {
 #endif
 #ifndef ALPHA_BLEND
     s.alpha = 1.0;
+#endif
+#ifdef HAS_LAYERS
+    material_layers(s, m, layers, OBJECT_SCALE);
 #endif
     return s;
 }

@@ -19,6 +19,10 @@ in vec4 in_tangent;
 centroid out vec4 v_tangent;
 #endif
 
+#ifdef HAS_TRANSMISSION
+flat out float v_scale;  // of the object: the cube root of what it does to volumes
+#endif
+
 // Writes gl_Position and every varying of this vertex: `v_position`, `v_normal`, `v_object`, those of the material, of
 // the tangent frame and of the velocity.
 void transform_vertex() {
@@ -32,6 +36,9 @@ void transform_vertex() {
     v_object = in_ids.y;
 #ifdef HAS_TANGENT
     v_tangent = vec4(direction_to_world(in_tangent.xyz), in_tangent.w * handedness());
+#endif
+#ifdef HAS_TRANSMISSION
+    v_scale = pow(abs(dot(in_object0.xyz, cross(in_object1.xyz, in_object2.xyz))), 1.0 / 3.0);
 #endif
     write_velocity_varyings();
     gl_Position = world_to_clip(v_position);

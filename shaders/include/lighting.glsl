@@ -1,6 +1,7 @@
 // Direct lighting of a surface. rendergraph provides `shadow()`, and with HAS_LIGHT_LIST the list of the lights that
 // may reach a position. With WRITES_SHADOW_DIFFERENCE, visibility is looked up at two positions within the texel
 // instead of at the surface's own. Their mean is used for lighting, and their difference is accumulated.
+#include <layered_light.glsl>
 #include <lights.glsl>
 #include <luminance.glsl>
 #include <radiance.glsl>
@@ -30,6 +31,9 @@ ReflectedLight direct_lighting(Surface s, int light) {
         irradiance *= light_visibility;
     }
     ReflectedLight reflectance = shade(s, light_dir);
+#ifdef HAS_LAYERS
+    reflectance = layered_light(s, light_dir, reflectance);
+#endif
 #if defined(WRITES_IRRADIANCE) && (TERMS == TERMS_ALL || TERMS == TERMS_DIFFUSE)
     s.diffuse = vec3(1.0);
     direct_irradiance += PI * shade(s, light_dir).diffuse * irradiance;

@@ -8,6 +8,13 @@ struct MaterialData {
     vec4 phong_diffuse;   // rgb = kd; w = exponent n of `phong`
     vec4 phong_specular;  // rgb = ks
     vec4 phong_ambient;   // rgb = ka
+#ifdef LAYERED_MATERIALS  // some material of the scene has a layer
+    vec4 clearcoat;       // factor, roughness, normal scale, 0
+    vec4 sheen;           // rgb = colour; w = roughness
+    vec4 iridescence;     // factor, index of refraction, least and greatest thickness in nm
+    vec4 transmission;    // factor, thickness, dispersion, index of refraction
+    vec4 absorption;      // rgb = per metre of the volume
+#endif
 };
 
 #ifdef MATERIAL_STORAGE
@@ -20,14 +27,17 @@ layout(std140) uniform material_block {
 };
 #endif
 
-#ifdef HAS_UV_TRANSFORM  // 8 texture slots per material, two rows each: u' = a u + b v + c
+#ifndef MATERIAL_SLOTS
+#define MATERIAL_SLOTS 8  // texture slots per material; those of layers follow if a material has one
+#endif
+#ifdef HAS_UV_TRANSFORM  // two rows for each slot of a material: u' = a u + b v + c
 #ifdef MATERIAL_UV_STORAGE
 layout(std430) readonly buffer material_uv_block {
     vec4 material_uvs[];
 };
 #else
 layout(std140) uniform material_uv_block {
-    vec4 material_uvs[MATERIAL_COUNT * 16];
+    vec4 material_uvs[MATERIAL_COUNT * MATERIAL_SLOTS * 2];
 };
 #endif
 #endif
@@ -40,6 +50,15 @@ const int EMISSIVE_SLOT = 4;
 const int ANISOTROPY_SLOT = 5;
 const int SPECULAR_SLOT = 6;
 const int SPECULAR_COLOR_SLOT = 7;
+const int CLEARCOAT_SLOT = 8;
+const int CLEARCOAT_ROUGHNESS_SLOT = 9;
+const int CLEARCOAT_NORMAL_SLOT = 10;
+const int SHEEN_COLOR_SLOT = 11;
+const int SHEEN_ROUGHNESS_SLOT = 12;
+const int IRIDESCENCE_SLOT = 13;
+const int IRIDESCENCE_THICKNESS_SLOT = 14;
+const int TRANSMISSION_SLOT = 15;
+const int THICKNESS_SLOT = 16;
 
 // With a single material its index is a constant, so the block is read once per draw.
 #if MATERIAL_COUNT == 1
@@ -52,8 +71,8 @@ const int SPECULAR_COLOR_SLOT = 7;
 // are the mesh's own.
 vec2 slot_uv(int material, int slot, vec2 uv) {
 #ifdef HAS_UV_TRANSFORM
-    vec4 u = material_uvs[MATERIAL_INDEX(material) * 16 + slot * 2];
-    vec4 v = material_uvs[MATERIAL_INDEX(material) * 16 + slot * 2 + 1];
+    vec4 u = material_uvs[(MATERIAL_INDEX(material) * MATERIAL_SLOTS + slot) * 2];
+    vec4 v = material_uvs[(MATERIAL_INDEX(material) * MATERIAL_SLOTS + slot) * 2 + 1];
     return vec2(dot(u.xy, uv) + u.z, dot(v.xy, uv) + v.z);
 #else
     return uv;

@@ -2,6 +2,9 @@
 #include <air.glsl>
 #include <environment_lighting.glsl>
 #include <math.glsl>
+#if defined(TRANSMISSION_LAYER) && defined(TRANSMITS)
+#include <transmitted_light.glsl>
+#endif
 
 #if defined(UNLIT) || defined(NEEDS_NOTHING)
 #define NO_LIGHTS
@@ -116,6 +119,9 @@ vec3 radiance_of(Surface s, ReflectedLight direct, ReflectedLight environment, b
     vec3 sum = vec3(0.0);
 #if TERMS == TERMS_ALL || TERMS == TERMS_EMISSIVE
     sum += s.emissive;
+#endif
+#if defined(TRANSMISSION_LAYER) && defined(TRANSMITS) && TERMS == TERMS_ALL
+    sum += transmitted_light(s);
 #endif
 #if TERMS == TERMS_ALL || TERMS == TERMS_AMBIENT
     environment = reflected_environment(s, environment);

@@ -22,7 +22,7 @@ void scene_tangent_frame(
 #endif
     int set = 0;
 #ifdef SCENE_NORMAL_ARRAYS
-    set = scene_textures[MATERIAL_INDEX(scene_instances[instance].material) * 8 + NORMAL_SLOT].w & 1;
+    set = scene_textures[MATERIAL_INDEX(scene_instances[instance].material) * MATERIAL_SLOTS + NORMAL_SLOT].w & 1;
 #endif
     vec2 uv = scene_vertex_uv(v.x, set);
     vec2 uv_a = scene_vertex_uv(v.y, set) - uv, uv_b = scene_vertex_uv(v.z, set) - uv;

@@ -3,7 +3,8 @@
 #include <scene_triangles.glsl>
 
 #ifdef SCENE_TEXTURES
-// Of each material its 8 slots: array (-1 without a texture), layer, width | height << 16, and bits: UV set, 2 without
+// Of each material its MATERIAL_SLOTS slots: array (-1 without a texture), layer, width | height << 16, and bits: UV
+// set, 2 without
 // filtering, 4 and 16 times the wrap mode along s and t (0 repeat, 1 mirror, 2 clamp).
 layout(std430) readonly buffer scene_texture_block {
     ivec4 scene_textures[];
@@ -52,7 +53,7 @@ float scene_wrapped(float u, int mode) {
 // across the image's edges.
 bool scene_texel(int instance, int slot, int arrays, SceneCoordinates c, out vec4 texel) {
     int material = MATERIAL_INDEX(scene_instances[instance].material);
-    ivec4 entry = scene_textures[material * 8 + slot];
+    ivec4 entry = scene_textures[material * MATERIAL_SLOTS + slot];
     int set = entry.w & 1;
     texel = vec4(1.0);
     if (entry.x < 0 || !scene_has(instance, set == 1 ? SCENE_HAS_UV1 : SCENE_HAS_UV0)) return false;

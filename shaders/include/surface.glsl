@@ -8,6 +8,8 @@
 #include <materials.glsl>
 #endif
 
+#include <layer_macros.glsl>
+
 struct Surface {
     vec3 position;
     vec3 normal;            // shading normal, unit
@@ -29,6 +31,28 @@ struct Surface {
     float exponent;    // n of `phong`; only with NEEDS_PHONG
     float anisotropy;  // strength; only with NEEDS_GRAIN
     float lit;         // 0 if the material is unlit, else 1
+#ifdef CLEARCOAT_LAYER
+    float clearcoat;  // factor
+    float clearcoat_roughness;
+    vec3 clearcoat_normal;  // unit
+#endif
+#ifdef SHEEN_LAYER
+    vec3 sheen_color;
+    float sheen_roughness;
+#endif
+#ifdef IRIDESCENCE_LAYER
+    float iridescence;  // factor
+    float film_ior;
+    float film_thickness;  // nm
+    vec3 film_f0;  // the f0 that stands for the film where the viewer looks from
+#endif
+#ifdef TRANSMISSION_LAYER
+    float transmission;  // fraction of the light that enters and passes through
+    float thickness;     // metres
+    float ior;
+    float dispersion;    // 20 / Abbe number
+    vec3 absorption;     // per metre
+#endif
 };
 
 // Derives the reflectance from base colour and metallic, and from f0 (rgb) and f90 (w) of the dielectric part.

@@ -1,4 +1,5 @@
 // Forward lighting with light from the vertices or the face. Textures and shadows are evaluated per fragment.
+#define NO_LAYERS
 #include <pass_view.glsl>
 #include <fragment_surface.glsl>
 #include <radiance.glsl>

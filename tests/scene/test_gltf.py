@@ -275,6 +275,29 @@ def test_materials_with_extensions(tmp_path: Path) -> None:
     assert (found.alpha_mode, found.alpha_cutoff, found.double_sided, found.unlit) == ("mask", 0.3, True, True)
 
 
+def test_layers_are_read_as_the_extensions_have_them(tmp_path: Path) -> None:
+    """Those that a file requires, too; a factor outside of its range is clamped."""
+    layers = {
+        "KHR_materials_clearcoat": {"clearcoatFactor": 1.5, "clearcoatRoughnessFactor": 0.2},
+        "KHR_materials_sheen": {"sheenColorFactor": [0.1, 0.2, 0.3], "sheenRoughnessFactor": 0.4},
+        "KHR_materials_iridescence": {"iridescenceFactor": 0.5, "iridescenceThicknessMaximum": 500},
+        "KHR_materials_transmission": {"transmissionFactor": 0.9},
+        "KHR_materials_volume": {"thicknessFactor": 2, "attenuationColor": [0.5, 1, 1], "attenuationDistance": 3},
+        "KHR_materials_dispersion": {"dispersion": 0.6},
+    }
+    top = gltf(materials=[{"extensions": layers}], extensionsUsed=[*layers], extensionsRequired=[*layers])
+    scene = read(tmp_path, top)
+    found = scene.materials[0]
+    assert [warning.code for warning in scene.warnings] == ["RG332"]
+    assert (found.clearcoat, found.clearcoat_roughness, found.clearcoat_normal_scale) == (1, 0.2, 1)
+    assert (found.sheen_color, found.sheen_roughness) == ((0.1, 0.2, 0.3), 0.4)
+    assert (found.iridescence, found.iridescence_ior, found.iridescence_thickness) == (0.5, 1.3, (100, 500))
+    assert (found.transmission, found.thickness, found.dispersion) == (0.9, 2, 0.6)
+    assert (found.attenuation_color, found.attenuation_distance) == ((0.5, 1, 1), 3)
+    assert scene.layers(found) == ("clearcoat", "sheen", "iridescence", "transmission")
+    assert scene.is_blended(found)
+
+
 def test_texture_transform(shared: Path) -> None:
     scene = load(shared / "assets/gltf/TextureTransformTest/TextureTransformTest.gltf")
     moved = {

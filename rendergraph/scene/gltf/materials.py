@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
+
+from msgspec.structs import asdict, replace
 
 from rendergraph.scene.gltf import schema
 from rendergraph.scene.gltf.buffers import Buffers, uri_bytes
@@ -26,6 +28,8 @@ _MIN_FILTERS = {
 }
 _OTHER_IMAGES = ("KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds")
 _IDENTITY = (1, 0, 0, 0, 1, 0)
+_NONE = asdict(schema.Layer())
+_UNITS = [key for key in _NONE if key.endswith("_factor") and key not in ("sheen_color_factor", "thickness_factor")]
 
 
 class Materials:
@@ -103,6 +107,10 @@ class Materials:
 
         pbr, extensions = material.pbr_metallic_roughness, material.extensions
         specular, anisotropy = extensions.specular, extensions.anisotropy
+        layers = schema.Layer()
+        for name in ("clearcoat", "sheen", "iridescence", "transmission", "volume", "dispersion"):
+            given = asdict(getattr(extensions, name)).items()
+            layers = replace(layers, **{key: value for key, value in given if value != _NONE[key]})
         textures: dict[str, Texture] = {}
         for slot, key, info in (
             ("base_color", "baseColorTexture", pbr.base_color_texture),
@@ -113,14 +121,16 @@ class Materials:
             ("specular", "specularTexture", specular.specular_texture),
             ("specular_color", "specularColorTexture", specular.specular_color_texture),
             ("anisotropy", "anisotropyTexture", anisotropy.anisotropy_texture),
+            *((k[:-8], k, getattr(layers, k)) for k in _NONE if k.endswith("_texture")),
         ):
-            srgb = slot in ("base_color", "emissive", "specular_color")
+            srgb = slot in ("base_color", "emissive", "specular_color", "sheen_color")
             if info is not None and (texture := self._texture(info, f"{where}.{key}", srgb)) is not None:
                 textures[slot] = texture
         red, green, blue, alpha = pbr.base_color_factor
         strength, ior = max(0.0, extensions.emissive.emissive_strength), extensions.ior.ior
         r, g, b = clamped_color("emissiveFactor", material.emissive_factor)
         mode = material.alpha_mode
+        units: dict[str, Any] = {key[:-7]: clamped(key, getattr(layers, key)) for key in _UNITS}
         return Material(
             name=names.unique(material.name, "material"),
             base_color=(
@@ -143,5 +153,14 @@ class Materials:
             specular_color=clamped_color("specularColorFactor", specular.specular_color_factor, math.inf),
             anisotropy_strength=clamped("anisotropyStrength", anisotropy.anisotropy_strength),
             anisotropy_rotation=anisotropy.anisotropy_rotation,
+            clearcoat_normal_scale=layers.clearcoat_normal_texture.scale if layers.clearcoat_normal_texture else 1.0,
+            iridescence_ior=max(1.0, layers.iridescence_ior),
+            iridescence_thickness=(layers.iridescence_thickness_minimum, layers.iridescence_thickness_maximum),
+            attenuation_distance=layers.attenuation_distance or math.inf,
+            attenuation_color=clamped_color("attenuationColor", layers.attenuation_color),
+            sheen_color=clamped_color("sheenColorFactor", layers.sheen_color_factor),
+            thickness=max(0.0, layers.thickness_factor),
+            dispersion=max(0.0, layers.dispersion),
+            **units,
             textures=textures,
         )

@@ -31,11 +31,9 @@ from rendergraph.scene.rig import Part, Rig, placements
 _READ = frozenset(
     {
         "KHR_lights_punctual",
-        "KHR_materials_unlit",
-        "KHR_materials_emissive_strength",
-        "KHR_materials_ior",
-        "KHR_materials_specular",
-        "KHR_materials_anisotropy",
+        *("KHR_materials_unlit", "KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_specular"),
+        *("KHR_materials_anisotropy", "KHR_materials_clearcoat", "KHR_materials_sheen", "KHR_materials_iridescence"),
+        *("KHR_materials_transmission", "KHR_materials_volume", "KHR_materials_dispersion"),
         "KHR_texture_transform",
         "KHR_mesh_quantization",
         "EXT_mesh_gpu_instancing",

@@ -16,6 +16,7 @@ from rendergraph.scene.reading import Reading
 
 Index: TypeAlias = Annotated[int, Meta(ge=0, le=2**53)]
 Size: TypeAlias = Annotated[int, Meta(ge=1, le=2**53)]
+Positive: TypeAlias = Annotated[float, Meta(ge=0)]
 Vec2: TypeAlias = tuple[float, float]
 Vec3: TypeAlias = tuple[float, float, float]
 Vec4: TypeAlias = tuple[float, float, float, float]
@@ -137,12 +138,45 @@ class Anisotropy(_Struct, frozen=True):
     anisotropy_texture: TextureInfo | None = None
 
 
+class Layer(_Struct, frozen=True):
+    """Any of the extensions that add a layer to a material."""
+
+    clearcoat_factor: float = 0.0
+    clearcoat_roughness_factor: float = 0.0
+    clearcoat_texture: TextureInfo | None = None
+    clearcoat_roughness_texture: TextureInfo | None = None
+    clearcoat_normal_texture: TextureInfo | None = None
+    sheen_color_factor: Vec3 = (0.0, 0.0, 0.0)
+    sheen_roughness_factor: float = 0.0
+    sheen_color_texture: TextureInfo | None = None
+    sheen_roughness_texture: TextureInfo | None = None
+    iridescence_factor: float = 0.0
+    iridescence_ior: float = 1.3
+    iridescence_thickness_minimum: Positive = 100.0
+    iridescence_thickness_maximum: Positive = 400.0
+    iridescence_texture: TextureInfo | None = None
+    iridescence_thickness_texture: TextureInfo | None = None
+    transmission_factor: float = 0.0
+    transmission_texture: TextureInfo | None = None
+    thickness_factor: float = 0.0
+    thickness_texture: TextureInfo | None = None
+    attenuation_distance: Positive = math.inf
+    attenuation_color: Vec3 = (1.0, 1.0, 1.0)
+    dispersion: float = 0.0
+
+
 class MaterialExtensions(_Struct, frozen=True):
     unlit: dict[str, Any] | None = field(name="KHR_materials_unlit", default=None)
     emissive: MaterialFactor = field(name="KHR_materials_emissive_strength", default=MaterialFactor())
     ior: MaterialFactor = field(name="KHR_materials_ior", default=MaterialFactor())
     specular: Specular = field(name="KHR_materials_specular", default=Specular())
     anisotropy: Anisotropy = field(name="KHR_materials_anisotropy", default=Anisotropy())
+    clearcoat: Layer = field(name="KHR_materials_clearcoat", default=Layer())
+    sheen: Layer = field(name="KHR_materials_sheen", default=Layer())
+    iridescence: Layer = field(name="KHR_materials_iridescence", default=Layer())
+    transmission: Layer = field(name="KHR_materials_transmission", default=Layer())
+    volume: Layer = field(name="KHR_materials_volume", default=Layer())
+    dispersion: Layer = field(name="KHR_materials_dispersion", default=Layer())
 
 
 class Material(_Struct, frozen=True):

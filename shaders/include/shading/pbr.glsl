@@ -1,6 +1,9 @@
 // Cook-Torrance: Lambert, and GGX with Smith visibility and Schlick's Fresnel. The diffuse part is not reduced by F.
 #pragma needs(grain_where_any)
 #include <anisotropic_ggx.glsl>
+#ifdef IRIDESCENCE_LAYER
+#include <iridescence.glsl>
+#endif
 
 #ifdef SAMPLES_DIRECTIONS
 #include <sampled_directions.glsl>
@@ -66,5 +69,9 @@ ReflectedLight shade(Surface s, vec3 light_dir) {
 #ifdef NEEDS_GRAIN
     if (s.anisotropy > 0.0) specular = anisotropic_specular(s, light_dir, half_vector, NoL, NoV);
 #endif
-    return ReflectedLight(s.diffuse * (NoL / PI), fresnel_schlick(s.f0, s.f90, VoH) * specular * NoL);
+    vec3 fresnel = fresnel_schlick(s.f0, s.f90, VoH);
+#ifdef IRIDESCENCE_LAYER
+    fresnel = mix(fresnel, film_reflectance(s.film_ior, s.film_thickness, s.f0, VoH), s.iridescence);
+#endif
+    return ReflectedLight(s.diffuse * (NoL / PI), fresnel * specular * NoL);
 }

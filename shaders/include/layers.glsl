@@ -1,0 +1,82 @@
+// The layers of a material (KHR_materials_clearcoat, sheen, iridescence, transmission and volume) at a point: their
+// values, their light, and what they leave of the light below them. From the top: coat, sheen, base. The base reflects
+// by its film, if it has one. `surface.glsl` says which layers there are; every function is the identity without any.
+#include <surface.glsl>
+#if defined(CLEARCOAT_LAYER) || defined(TRANSMISSION_LAYER)
+#include <brdf.glsl>
+#endif
+#ifdef SHEEN_LAYER
+#include <sheen.glsl>
+#include <brdf_table.glsl>
+#endif
+#ifdef IRIDESCENCE_LAYER
+#include <iridescence.glsl>
+#endif
+
+#ifdef HAS_LAYERS
+// What the layers' textures hold; 1 where there is none.
+struct LayerTexels {
+    vec2 clearcoat;  // factor, roughness
+    vec4 sheen;      // colour, roughness
+    vec2 iridescence;   // factor; where between the two thicknesses
+    vec2 transmission;  // factor, thickness
+    vec3 clearcoat_normal;  // of the coat in world space, unit
+};
+
+// Fills in the layers of a surface that is complete but for them. `texels` hold the coat's normal in any case; `scale`
+// is that of the object.
+void material_layers(inout Surface s, MaterialData m, LayerTexels texels, float scale) {
+    float NoV = clamp(dot(s.normal, s.view_dir), 0.0, 1.0);
+#ifdef TRANSMISSION_LAYER
+    s.transmission = m.transmission.x * texels.transmission.x * (1.0 - s.metallic);
+    s.thickness = m.transmission.y * texels.transmission.y * scale;
+    s.dispersion = m.transmission.z;
+    s.ior = m.transmission.w;
+    s.absorption = m.absorption.rgb;
+    s.diffuse *= 1.0 - s.transmission;
+    s.ambient *= 1.0 - s.transmission;
+#ifndef TRANSMITS  // without a picture of what is behind, the surface is blended over it
+    float opacity = 1.0 - s.transmission * (1.0 - fresnel_schlick(vec3(s.dielectric.r), 1.0, NoV).r);
+    s.alpha *= opacity;
+    s.diffuse /= max(opacity, 1e-3);
+    s.emissive /= max(opacity, 1e-3);
+#endif
+#endif
+#ifdef IRIDESCENCE_LAYER
+    s.iridescence = m.iridescence.x * texels.iridescence.x;
+    s.film_ior = m.iridescence.y;
+    s.film_thickness = mix(m.iridescence.z, m.iridescence.w, texels.iridescence.y);
+    vec3 film = film_reflectance(s.film_ior, s.film_thickness, s.f0, NoV);
+    s.film_f0 = mix(s.f0, schlick_f0(film, NoV), s.iridescence);
+#endif
+#ifdef SHEEN_LAYER
+    s.sheen_color = m.sheen.rgb * texels.sheen.rgb;
+    s.sheen_roughness = max(m.sheen.a * texels.sheen.a, LEAST_SHEEN_ROUGHNESS);
+#endif
+#ifdef CLEARCOAT_LAYER
+    s.clearcoat = m.clearcoat.x * texels.clearcoat.x;
+    s.clearcoat_roughness = m.clearcoat.y * texels.clearcoat.y;
+    s.clearcoat_normal = texels.clearcoat_normal;
+    s.emissive *= 1.0 - s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, max(dot(s.clearcoat_normal, s.view_dir), 0.0)).r;
+#endif
+}
+
+#ifdef SHEEN_LAYER
+// Fraction of uniform light that white sheen reflects to a direction, before it is limited to 1.
+float sheen_albedo(Surface s, float cosine) {
+    return 4.0 * textureLod(brdf_table, vec2(sqrt(clamp(cosine, 0.0, 1.0)), s.sheen_roughness), 0.0).z;
+}
+
+// What sheen leaves of the light between the base and a direction with this albedo of white sheen.
+float below_sheen(Surface s, float albedo) {
+    return 1.0 - max(max(s.sheen_color.r, s.sheen_color.g), s.sheen_color.b) * min(albedo, 1.0);
+}
+#endif
+
+#ifdef CLEARCOAT_LAYER
+// Reflectance of the smooth coat, of ior 1.5, at this cosine.
+float clearcoat_reflectance(Surface s, float cosine) {
+    return s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, clamp(cosine, 0.0, 1.0)).r;
+}
+#endif
+#endif
