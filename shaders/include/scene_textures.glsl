@@ -4,8 +4,7 @@
 
 #ifdef SCENE_TEXTURES
 // Of each material its MATERIAL_SLOTS slots: array (-1 without a texture), layer, width | height << 16, and bits: UV
-// set, 2 without
-// filtering, 4 and 16 times the wrap mode along s and t (0 repeat, 1 mirror, 2 clamp).
+// set, 2 without filtering, 4 and 16 times the wrap mode along s and t (0 repeat, 1 mirror, 2 clamp).
 layout(std430) readonly buffer scene_texture_block {
     ivec4 scene_textures[];
 };
