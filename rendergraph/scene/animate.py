@@ -95,32 +95,26 @@ def at(scene: Scene, time_s: float) -> Scene:
             values["extra"] = Extra({**recipe.get("extra", NO_EXTRA), **added})
         if values:
             scene = _changed(scene, section, name, {**recipe, **values})
-    stays = not any(
-        section == "objects" for section, _ in changed
-    )  # clips move what is around a target, not the target
-    return scene if scene.orbit is None else _orbited(scene, time_s, first if stays else scene)
+    # Clips move what is around a target, and not the target.
+    placed = scene if any(section == "objects" for section, _ in changed) else first
+    return scene if scene.orbit is None else _orbited(scene, time_s, placed)
 
 
 def _posed(scene: Scene, time_s: float) -> Scene:
     """The scene with what its files' clips move, and where that is in each placement of a file."""
     for rig in scene.rigs:
         worlds, parts = rig.at(time_s)
+        local: Any = [part[0] for part in parts], worlds[list(rig.lights)], worlds[list(rig.cameras)]
         objects, placements, moved = list(scene.objects), dict(scene.placements), {}
         poses: dict[int, Pose] = {}
         for name, _ in rig.placements:
-            before = placements[name]
-            now = placements[name] = Placement(
-                tuple((index, part[0]) for (index, _), part in zip(before.objects, parts, strict=True)),
-                tuple((index, worlds[node]) for (index, _), node in zip(before.lights, rig.lights, strict=True)),
-                tuple((camera, worlds[node]) for (camera, _), node in zip(before.cameras, rig.cameras, strict=True)),
-            )
-            moved[name] = Placement(
-                *(
-                    tuple(b for a, b in zip(*pair, strict=True) if not np.array_equal(a[1], b[1]))
-                    for pair in zip(astuple(before), astuple(now), strict=True)
-                )
-            )
-            for (index, _), (_, *state) in zip(now.objects, parts, strict=True):
+            kinds = [
+                [(key, now, np.array_equal(was, now)) for (key, was), now in zip(*each, strict=True)]
+                for each in zip(astuple(placements[name]), local, strict=True)
+            ]
+            placements[name] = Placement(*(tuple((key, now) for key, now, _ in kind) for kind in kinds))
+            moved[name] = Placement(*(tuple((key, now) for key, now, same in kind if not same) for kind in kinds))
+            for (index, _), (_, *state) in zip(placements[name].objects, parts, strict=True):
                 number = objects[index].mesh
                 if (deform := scene.meshes[number].deform) is not None:
                     if number not in poses:
