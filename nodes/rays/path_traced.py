@@ -102,7 +102,7 @@ class PathTraced(Node):
     emitter_table = Internal(
         AnyTexel,
         format="rgba32f",
-        size=lambda node, facts: (_table_side(node, facts),) * 2,
+        size=lambda node, facts: (_table_side(node, facts), _table_side(node, facts)),
         mips=0,
         doc="Power of each emitting triangle.",
     )
