@@ -34,7 +34,6 @@ _ROLES = {
 _REFERENCE: Schema = {"type": "string", "pattern": "^\\$", "description": "A parameter of the pipeline."}
 _WORDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "array": "a list"}
 
-
 Links = Mapping[str, Mapping[str, Sequence[str]]]
 """The links that fit each input of each node, by id and name, as `link.fitting` returns them."""
 

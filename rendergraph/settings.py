@@ -119,7 +119,7 @@ class Roots(Struct, frozen=True):
     folders: tuple[Path, ...]
 
     @classmethod
-    def of_file(cls, file: Path, extra: Iterable[Path] = (), cwd: Path | None = None) -> Roots:
+    def of_file(cls, file: Path, extra: Iterable[Path] = ()) -> Roots:
         """Return the roots of everything reached from a file that the user named.
 
         Args:
@@ -130,7 +130,7 @@ class Roots(Struct, frozen=True):
         project = nearest_settings(home)
         if project is not None:
             folders.append(_resolved(project.folder))
-            here = _resolved(cwd or Path.cwd())
+            here = _resolved(Path.cwd())
             if here.is_relative_to(folders[-1]):
                 folders += [_resolved(folder) for folder in project.asset_roots]
         folders += [_resolved(folder) for folder in extra]

@@ -26,7 +26,6 @@ from rendergraph.textures import BufferDesc, TextureDesc
 # Above this, placing bytes takes longer than its figure is worth.
 MOST_PLACED = 2_000
 
-
 Tier: TypeAlias = Literal["descriptor", "view", "heap"]
 """How textures share memory: equal descriptions, equal texel classes through views, or blocks of a heap."""
 
@@ -192,7 +191,6 @@ def _lifetimes(schedule: Schedule) -> dict[str, Lifetime]:
 
 Groups = list[list[str]]
 """Resources that live in one physical each, in time order."""
-
 
 Kinds: TypeAlias = Mapping[str, object]
 """What a resource has in common with those that it can share with, by id."""

@@ -27,7 +27,7 @@ class HeapItem(Struct, frozen=True, gc=False):
 
 
 @lru_cache(64)  # most changes of a pipeline leave what is placed what it was
-def share_blocks(items: tuple[HeapItem, ...], *, seed: int = 0) -> tuple[tuple[int, ...], ...]:
+def share_blocks(items: tuple[HeapItem, ...]) -> tuple[tuple[int, ...], ...]:
     """Return the numbers of the items in each block, in time order, so that the blocks have few bytes.
 
     Largest first, each where the block grows least; of equal blocks one with its kind, then the tightest. Then seeded
@@ -40,7 +40,7 @@ def share_blocks(items: tuple[HeapItem, ...], *, seed: int = 0) -> tuple[tuple[i
     if least > bound:
         import random  # most orders are the best at once
 
-        chooser = random.Random(seed)
+        chooser = random.Random(0)
         for _ in range(min(RESTARTS, WORK // max(1, len(items)) ** 2)):
             weights = [item.bytes * chooser.uniform(0.5, 1.5) for item in items]
             other, taken = _placed(items, alive, sorted(numbers, key=lambda n: (-weights[n], n)))

@@ -201,7 +201,6 @@ plugin_option = click.option(
     "--plugin", "plugins", multiple=True, type=_PATH, metavar="PATH", help="Node module or folder of them; runs code."
 )
 
-
 device_option = click.option("--device", metavar="NUMBER", type=int, help="GL device, as `doctor` numbers them.")
 scene_option = click.option(
     "--scene",

@@ -18,7 +18,6 @@ from rendergraph.formatting import jsonable
 _RED, _YELLOW, _BOLD, _PLAIN = "\x1b[1;31m", "\x1b[1;33m", "\x1b[1m", "\x1b[0m"
 _CONTROL = "[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]"
 
-
 _SCREENFUL = 10
 """Errors that are printed, of three lines each; `--json` lists all."""
 _DATA: ContextVar[TextIO | None] = ContextVar("data")

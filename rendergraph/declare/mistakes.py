@@ -37,7 +37,6 @@ _OF_THE_FRAMEWORK = frozenset(
 """Macros that shaders are given whatever the node declares."""
 _ROLES = "param(…), define(…) or structural(…)"
 
-
 _METHODS = {"record": "self, steps", "update": "self, frame", "camera_jitter": "self, frame"}
 _TAKES_ANY = 0x04  # of a function with *arguments
 _SOUND: WeakSet[type[Node]] = WeakSet()

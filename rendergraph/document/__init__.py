@@ -12,18 +12,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TextIO
 
-from rendergraph.document.parsing import YamlLimits as YamlLimits
-from rendergraph.document.parsing import over_limit
-from rendergraph.document.parsing import parse as parse
-from rendergraph.document.parsing import scalar as scalar
-from rendergraph.document.values import BROKEN as BROKEN
-from rendergraph.document.values import Document as Document
-from rendergraph.document.values import Source as Source
-from rendergraph.document.values import Value as Value
-from rendergraph.document.values import describe as describe
-from rendergraph.document.values import from_plain as from_plain
-from rendergraph.document.values import kind_of as kind_of
-from rendergraph.document.values import shown as shown
+from rendergraph.document.parsing import YamlLimits, over_limit, parse, scalar
+from rendergraph.document.values import BROKEN, Document, Source, Value, describe, from_plain, kind_of, shown
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.stamps import record_read
 

@@ -11,25 +11,11 @@ from typing import TYPE_CHECKING
 from rendergraph.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from rendergraph.reference.assets import describe_pipeline as describe_pipeline
-    from rendergraph.reference.assets import describe_scene as describe_scene
-    from rendergraph.reference.assets import kind_of as kind_of
-    from rendergraph.reference.examples import example_file as example_file
-    from rendergraph.reference.examples import example_text as example_text
-    from rendergraph.reference.node_types import describe_node as describe_node
-    from rendergraph.reference.node_types import input_facts as input_facts
-    from rendergraph.reference.node_types import meaning as meaning
-    from rendergraph.reference.node_types import output_facts as output_facts
-    from rendergraph.reference.node_types import summary as summary
-    from rendergraph.reference.programs import complete_shader as complete_shader
-    from rendergraph.reference.programs import describe_program as describe_program
-    from rendergraph.reference.programs import describe_programs as describe_programs
-    from rendergraph.reference.programs import find_node_of_type as find_node_of_type
-    from rendergraph.reference.topics import FILE_KINDS as FILE_KINDS
-    from rendergraph.reference.topics import error_codes as error_codes
-    from rendergraph.reference.topics import error_page as error_page
-    from rendergraph.reference.topics import file_keys as file_keys
-    from rendergraph.reference.topics import table_of as table_of
+    from rendergraph.reference.assets import describe_pipeline, describe_scene, kind_of
+    from rendergraph.reference.examples import example_file, example_text
+    from rendergraph.reference.node_types import describe_node, input_facts, meaning, output_facts, summary
+    from rendergraph.reference.programs import complete_shader, describe_program, describe_programs, find_node_of_type
+    from rendergraph.reference.topics import FILE_KINDS, error_codes, error_page, file_keys, table_of
 
 
 __getattr__, __dir__ = lazy_exports(

@@ -14,15 +14,8 @@ from rendergraph.keys import Validator, plain
 from rendergraph.read import CODES, SIZE, checked, entries, flag, read, word
 from rendergraph.resolve.files import Files
 from rendergraph.resolve.flatten import Flattener, parameters
-from rendergraph.resolve.patches import diff as diff
-from rendergraph.resolve.patches import merge_patch as merge_patch
-from rendergraph.resolve.patches import patch_of, settings
-from rendergraph.resolve.spec import DEFAULT_SIZE as DEFAULT_SIZE
-from rendergraph.resolve.spec import NodeSpec as NodeSpec
-from rendergraph.resolve.spec import PipelineParameter as PipelineParameter
-from rendergraph.resolve.spec import PipelineSpec as PipelineSpec
-from rendergraph.resolve.spec import Scope as Scope
-from rendergraph.resolve.spec import to_yaml as to_yaml
+from rendergraph.resolve.patches import diff, merge_patch, patch_of, settings
+from rendergraph.resolve.spec import DEFAULT_SIZE, NodeSpec, PipelineParameter, PipelineSpec, Scope, to_yaml
 from rendergraph.resources import is_name, shipped_pipelines, shipped_scenes
 from rendergraph.settings import Roots
 

@@ -246,7 +246,6 @@ ORBIT = Table(
     ),
 )
 
-
 SECTIONS = {"objects": OBJECT, "materials": MATERIAL, "lights": LIGHT, "cameras": CAMERA, "environment": ENVIRONMENT}
 """The tables of the sections' entries, whose numbers, vectors and colours keyframes may change."""
 _SHAPE_KEYS = {key.name for shape in SHAPES.values() for key in shape.keys}

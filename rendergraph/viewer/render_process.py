@@ -17,7 +17,6 @@ from rendergraph.viewer.messages import Request, Response
 TIMEOUT = 30.0
 """Seconds that a request may take; the first one of a process may take longer."""
 
-
 FIRST_TIMEOUT = 120.0
 """Seconds that the first request of a process may take, at least: it also imports, opens the device, and compiles."""
 
