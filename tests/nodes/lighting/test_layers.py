@@ -176,3 +176,57 @@ def test_films_have_the_colours_of_airys_sum(evaluate: Evaluate) -> None:
     expected = np.clip([film(*row) for row in rows], 0, 1)
     assert np.abs(made[:, :3] - expected).mean() < 0.02
     assert np.abs(made[:, :3] - expected).max() < 0.1
+
+
+WINDOW = """scene: 1
+objects:
+  left: {shape: box, size: [4, 8, 0.1], at: [-2, 0, -2.05], material: bright}
+  right: {shape: box, size: [4, 8, 0.1], at: [2, 0, -2.05], material: dim}
+  pane: {shape: plane, size: [1, 1], at: [0, 0, 0], rotate_degrees: [90, 0, 0], scale: 2, material: pane}
+  turned: {shape: plane, size: [2, 2], at: [0, 0, 0], rotate_degrees: [90, %s, 0], material: pane, hidden: %s}
+materials:
+  bright: {base_color: 0, specular: 0, emissive: [0.8, 0.8, 0.8]}
+  dim: {base_color: 0, specular: 0, emissive: [0.2, 0.2, 0.2]}
+  pane: {roughness: %s, transmission: 1, double_sided: true, %s}
+lights: {lamp: {type: point, at: [0, 50, 0], intensity: 0}}
+cameras: {main: {eye: [0, 0, 4], target: [0, 0, 0], height: 2}}
+"""
+
+
+@pytest.mark.parametrize("pipeline", ["forward", "deferred"])
+def test_a_volume_tints_by_its_depth(session: rg.Session, tmp_path: Path, pipeline: str) -> None:
+    """Of an index of refraction of 1 nothing is reflected: base colour times what is left of 2 × 0.3 m, at scale 2."""
+    values = (
+        "base_color: [0.9, 0.5, 1], ior: 1, thickness: 0.3, attenuation_color: [0.5, 0.25, 1], attenuation_distance: 1"
+    )
+    (tmp_path / "window.yaml").write_text(WINDOW % (0, "true", 0, values))
+    sets = ("light.environment=null", "light.ambient=0")
+    loaded = rg.load(pipeline, scene=tmp_path / "window.yaml", sets=sets, size=(40, 40))
+    picture = np.asarray(session.render(loaded, outputs=["radiance"])["radiance"], np.float64)[..., :3]
+    tint = np.array([0.9, 0.5, 1]) * np.array([0.5, 0.25, 1]) ** 0.6
+    np.testing.assert_allclose(picture[:, :18], np.broadcast_to(0.8 * tint, (40, 18, 3)), rtol=6e-3)
+    np.testing.assert_allclose(picture[:, 22:], np.broadcast_to(0.2 * tint, (40, 18, 3)), rtol=6e-3)
+
+
+def test_a_turned_pane_moves_what_is_behind_it_by_snells_law(session: rg.Session, tmp_path: Path) -> None:
+    """And roughness blurs it; in the middle of the picture, where the two walls meet."""
+    angle, ior, thickness = np.radians(35), 1.5, 0.5
+    sets = ("light.environment=null", "light.ambient=0", "light.terms=all")
+
+    def row(roughness: float) -> Floats:
+        values = f"base_color: 1, ior: {ior}, thickness: {thickness}"
+        text = WINDOW % (35, "false", roughness, values)
+        (tmp_path / "window.yaml").write_text(text.replace("  pane: {shape", "  other: {hidden: true, shape"))
+        loaded = rg.load("forward", scene=tmp_path / "window.yaml", sets=sets, size=(200, 200))
+        return np.asarray(session.render(loaded, outputs=["radiance"])["radiance"], np.float64)[100, :, 0]
+
+    sharp = row(0)
+    # A ray along -z is bent towards the pane's normal, so it leaves the volume to the side by this much.
+    inner = np.arcsin(np.sin(angle) / ior)
+    shift = thickness * np.sin(angle - inner)
+    inside = sharp[30:170]
+    edge = 30 + int(np.argmax(np.abs(np.diff(inside)))) + 1
+    assert abs(edge - 100) / 100 == pytest.approx(shift, abs=0.011)
+    assert 0.7 < inside.max() < 0.8, "less what the pane reflects"
+    blurred = row(0.3)[30:170]
+    assert np.abs(np.diff(blurred)).max() < 0.2 * np.abs(np.diff(inside)).max()
