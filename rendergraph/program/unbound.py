@@ -17,6 +17,7 @@ from rendergraph.program.text import StageText, prefix
 from rendergraph.steps import Read, Step, Write
 
 _VIEWS = re.compile(r"\b([A-Za-z_]\w*)_views\b")
+_UNIFORMS = re.compile(r"uniform[^;]*;")  # found quickly; each begins with the character before it, for `\b`
 _BUFFER = re.compile(r"\bbuffer\s+([A-Za-z_]\w*)\s*\{")
 _UNIFORM = re.compile(
     r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?(?!\w*(?:sampler|image|only\b|coherent|volatile|restrict))\w+\s+([A-Za-z_][\w\s,]*)[;=\[]"
@@ -98,21 +99,22 @@ def _suspects(step: Step, own: str, whole: str, cls: type[Node]) -> Iterator[tup
     kinds = {name: (count, floats) for name, count, floats in uniform_kinds(step)}
     set_names = {prefix(each.node) + name for each in step.functions for name, _ in each.uniforms}
     set_names |= {"view_index", *kinds, *given}
-    for name in declared_samplers(own).keys() - given:
+    uniforms = "".join(own[max(found.start() - 1, 0) : found.end()] for found in _UNIFORMS.finditer(own))
+    for name in declared_samplers(uniforms).keys() - given:
         if not (name.endswith("_texture") and step.kind == "geometry"):
             yield "RG430", name, _DECLARED.format(name), partial(unbound_sampler, step, name, given, cls)
-    for stem in set(_VIEWS.findall(own)):
+    for stem in {stem for line in own.split("\n") if "_views" in line for stem in _VIEWS.findall(line)}:
         port = stem.removeprefix("previous_")
         if port in cls.ports() and f"{stem}_view_block" not in whole:
             yield "RG430", f"{stem}_views", rf"\b{stem}_views\b", partial(_without_views, step, port, given, cls)
     for name in _BUFFER.findall(own) if "buffer" in own else ():
         if name not in given:
             yield "RG430", name, rf"\bbuffer\s+{name}\b", partial(unbound_block, step, name)
-    for names in _UNIFORM.findall(own):
+    for names in _UNIFORM.findall(uniforms):
         for name in re.findall(r"[A-Za-z_]\w*", names):
             if name not in set_names:
                 yield "RG434", name, _DECLARED.format(name), partial(unset_uniform, step, name)
-    for kind, name in _TYPED.findall(own):
+    for kind, name in _TYPED.findall(uniforms):
         count, floats = kinds.get(name, (0, False))
         if count and (count != (int(kind[-1]) if kind[-1].isdigit() else 1) or (floats and kind[0] in "iub")):
             yield "RG436", name, rf"\b{kind}\s+{name}\b", partial(_unfit_uniform, step, name, kind, count)

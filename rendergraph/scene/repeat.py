@@ -105,7 +105,7 @@ def copies(values: Mapping[str, Any], columns: Mapping[str, Doubles]) -> Copies:
     kept: dict[str, Sequence[Any]] = {key: found[key] for key in ("color", "intensity", "range") if key in found}
     choose = dict(values.get("choose", {}))
     order = choose.pop("order", "random")
-    picks = np.arange(n) if order == "turn" else _random(seed, "choose", (n,))
+    picks = np.arange(n) if order == "turn" or not choose else _random(seed, "choose", (n,))
     for key, choices in choose.items():
         index = picks % len(choices) if order == "turn" else (picks * len(choices)).astype(int)
         kept[key] = [choices[number] for number in index.tolist()]

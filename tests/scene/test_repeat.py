@@ -114,6 +114,13 @@ def test_random_numbers_are_the_same_everywhere() -> None:
     np.testing.assert_array_equal(_random(0, "at", (3,)), [0.6369616873214543, 0.2697867137638703, 0.04097352393619469])
 
 
+def test_copies_without_chance_draw_no_random_numbers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their generator takes as long to import as half of the scene takes to read."""
+    monkeypatch.setattr("rendergraph.scene.repeat._random", None)
+    assert len(positions(lamps(tmp_path, "line: 3"))) == 3
+    lamps(tmp_path, "line: 3, choose: {color: [[1, 0, 0], [0, 1, 0]], order: turn}")
+
+
 def test_objects_vary_in_turn_and_size(tmp_path: Path) -> None:
     more = ", scale: [1, 2, 3], rotate_degrees: [0, 30, 0]"
     found = np.array(boxes(tmp_path, "line: 500, vary: {rotate_degrees: [0, 180, 0], scale: 0.5}", more))
