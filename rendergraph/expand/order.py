@@ -103,17 +103,12 @@ class _StepOrder:
             place = value if value is not None else place
         if len(hops) > 6:
             hops[3:-2] = ["…"]
-        every = [later for _, later in pairwise(steps) if self._reads_all(later)]
+        every = [key for _, key in pairwise(steps) if self.recordings[key[0]].requests[key[1]].reads_all]
         way = "'@previous' behind one reads last frame's value"
         if every:
             way = f"{self._name(every[0])} names no input, so it reads all: name in `record` what it reads; or {way}"
         text = f"the steps form a cycle: {', '.join(hops)}; {way}"
         return place.problem("RG117", text) if place is not None else Problem("RG117", text)
-
-    def _reads_all(self, key: _Step) -> bool:
-        recording = self.recordings[key[0]]
-        request = recording.requests[key[1]]
-        return request.caller is not None and request.bindings.keys() == recording.reads(()).keys() != set()
 
     def _name(self, key: _Step) -> str:
         name, number = key

@@ -53,8 +53,10 @@ def _feedback(request: StepRequest, write: Write, reads: Iterable[Read]) -> Iter
         if read.resource != write.resource or read.previous or read.use != "sample":
             continue
         if read.mip in (None, write.mip or 0) and overlap((0, read.layer), (0, write.layer)):
-            text = f"it samples '{read.resource}' in the step that writes it"
-            yield "RG422", f"{text}; blend, sample another mip or layer, or go through an `Internal`"
+            text = f"it samples '{read.resource}' in the step that writes it; "
+            if request.reads_all:
+                text += f"a step that names no input reads all: leave it out by {read.name}=None; or "
+            yield "RG422", f"{text}blend, sample another mip or layer, or go through an `Internal`"
 
 
 def target_size(

@@ -69,7 +69,7 @@ def unbound(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> Iter
         if found:  # mostly in a branch that the step's macros exclude
             macros = [line for block in text.source.blocks if block.origin.file is None for line in block.lines]
             quick = compiled_text("\n".join([*macros, own]), certain=True)
-            found = [suspect for suspect in found if re.search(suspect[2], quick)]
+            found = [one for one in found if one[1] in quick and re.search(one[2], quick)]
         if not found:
             continue
         names, declared = reachable_names(text.text, certain=True), compiled_text(text.text, certain=True)

@@ -53,7 +53,8 @@ class Recorder(Protocol):
 class StepRequest(Struct, frozen=True, gc=False):
     """A step as the node requested it, before its ports are mapped to resources.
 
-    `caller` is the author's file and line of the call, None if the framework recorded the step itself.
+    `caller` is the author's file and line of the call, None if the framework recorded the step itself; `reads_all`
+    says that the call names no input, so the step reads all that are connected.
     """
 
     kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps", "resolve", "upload"]
@@ -64,6 +65,7 @@ class StepRequest(Struct, frozen=True, gc=False):
     defines: Mapping[str, str] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
     caller: tuple[str, int] | None = None
+    reads_all: bool = False
 
     @property
     def reads(self) -> Iterator[Port | Part]:
@@ -440,7 +442,8 @@ class Steps:
         if "over" in options:
             options["invocations"] = self._invocations(options.pop("over"), targets, textures)
         reads: Mapping[str, Target] = textures
-        if not textures and kind in ("fullscreen", "geometry", "draw", "compute"):
+        caller, reads_all = _caller(), not textures and kind in ("fullscreen", "geometry", "draw", "compute")
+        if reads_all:
             every = self._recorder.reads(targets.values())
             reads = {name: port for name, port in every.items() if bindings.get(name, port) is not None}
         self._recorder.add(
@@ -452,7 +455,8 @@ class Steps:
                 uniforms=uniforms,
                 defines={name: checks.macro(name, value) for name, value in (defines or {}).items()},
                 options=options,
-                caller=_caller(),
+                caller=caller,
+                reads_all=reads_all and caller is not None and bool(reads),
             )
         )
 

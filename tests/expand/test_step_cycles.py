@@ -222,6 +222,39 @@ class Careless(Node):
         steps.fullscreen("scale.frag", source=self.lit, out={"prepared": self.composed}, gain=0.5)
 
 
+class Adding(Node):
+    """Adds to a picture, with a step that reads whatever is connected."""
+
+    source = Input(Radiance, doc="Read by nobody.")
+    radiance = InOut(Radiance, doc="The picture.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("scale.frag", out={"prepared": self.radiance}, gain=0.5, state=State(blend=ADD))
+
+
+def test_a_step_that_reads_what_it_writes_because_it_names_no_input(bench: Any) -> None:
+    text = """nodes:
+  ground: {type: ground}
+  add: {type: adding, inputs: {source: ground.color, radiance: ground.color}}
+outputs: {image: add.radiance}
+"""
+    with pytest.raises(InputError, match=r"RG422 .* names no input reads all: leave it out by source=None; or blend"):
+        bench.pipeline(text, *NODES, Adding, shaders=SHADERS).check()
+
+
+class Thorough(Careless):
+    """Names all that it reads, and still reads too much."""
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("scale.frag", source=self.source, lit=self.lit, out=self.prepared, gain=0.5)
+        steps.fullscreen("scale.frag", source=self.lit, out={"prepared": self.composed}, gain=0.5)
+
+
+def test_a_step_that_names_all_inputs_is_not_said_to_name_none(bench: Any) -> None:
+    with pytest.raises(InputError, match=r"RG117 the steps form a cycle: [^;]*; '@previous' behind one"):
+        bench.pipeline(TEXT.replace("type: bracket", "type: thorough"), *NODES, Thorough, shaders=SHADERS).check()
+
+
 def test_a_cycle_of_steps_is_named_with_steps_nodes_and_lines(bench: Any) -> None:
     with pytest.raises(InputError) as caught:
         bench.pipeline(TEXT.replace("type: bracket", "type: careless"), *NODES, Careless, shaders=SHADERS).check()
