@@ -5,6 +5,7 @@
 #include "environment_directions.glsl"
 #include "offset_ray.glsl"
 #include "path_light.glsl"
+#include "path_visibility.glsl"
 #include "random.glsl"
 
 #ifdef HAS_ENVIRONMENT
@@ -116,7 +117,8 @@ SourceSample sample_source(
         float weight = power_heuristic(chosen, direction_density(s, to_emitter));
         if (facing > 0.0 && square > 0.0) {
             found.reflected = emission(emitter.instance, emitter.triangle, barycentrics) * reflected(s, to_emitter)
-                * (SPREAD_LIGHT * weight / max(chosen, 1e-37));
+                * (SPREAD_LIGHT * weight * opacity(emitter.instance, emitter.triangle, barycentrics)
+                    / max(chosen, 1e-37));
         }
         found.direction = offset_ray(at, normal) - origin;
         found.reach = 1.0;

@@ -1,6 +1,20 @@
 // Shadows of paths: what masks and transparent surfaces let through counts, too.
 #include <trace.glsl>
 
+// Fraction of light that a surface stops: all of it or none with an alpha mask, else as opaque as it is.
+float opacity(int instance, int triangle, vec2 barycentrics) {
+    float opaque = 1.0;
+#if defined(SCENE_ANY_MASKED) || defined(SCENE_ANY_BLENDED)
+    int flags = scene_instances[instance].flags;
+    if ((flags & (SCENE_MASKED | SCENE_BLENDED)) != 0) {
+        float alpha = scene_alpha(instance, triangle, barycentrics);
+        float cutoff = materials[MATERIAL_INDEX(scene_instances[instance].material)].emissive.a;
+        opaque = (flags & SCENE_MASKED) != 0 ? step(cutoff, alpha) : clamp(alpha, 0.0, 1.0);
+    }
+#endif
+    return opaque;
+}
+
 // Fraction of light that arrives from another point.
 float visibility(vec3 origin, vec3 direction, float farthest, int wanted) {
     Hit hit;
@@ -8,14 +22,7 @@ float visibility(vec3 origin, vec3 direction, float farthest, int wanted) {
     float passed = 1.0, nearest = 0.0;
     while (passed > 0.0 && trace(origin, direction, nearest, farthest, wanted, 0, false, hit)) {
         nearest = hit.distance;
-        int flags = scene_instances[hit.instance].flags;
-        if ((flags & (SCENE_MASKED | SCENE_BLENDED)) == 0) {
-            passed = 0.0;
-        } else {
-            float alpha = scene_alpha(hit.instance, hit.triangle, hit.barycentrics);
-            float cutoff = materials[MATERIAL_INDEX(scene_instances[hit.instance].material)].emissive.a;
-            passed *= 1.0 - ((flags & SCENE_MASKED) != 0 ? step(cutoff, alpha) : clamp(alpha, 0.0, 1.0));
-        }
+        passed *= 1.0 - opacity(hit.instance, hit.triangle, hit.barycentrics);
     }
     return passed;
 #else
