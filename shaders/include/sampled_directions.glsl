@@ -21,6 +21,12 @@ vec3 sample_cosine_power(vec2 xi, float n) {
     return vec3(sin_theta * cos(phi), sin_theta * sin(phi), cos_theta);
 }
 
+// The unit vector to the viewer in tangent space, above the horizon. Interpolated and mapped normals may turn away from
+// the viewer; directions are then chosen as for a viewer at grazing incidence, and their density is of this choice.
+vec3 viewer_above(vec3 v) {
+    return normalize(vec3(v.xy, max(v.z, 1e-4)));
+}
+
 // Microfacet normal of GGX as far as it is visible along `v`, in tangent space, from a point `xi` of the unit square
 // (E. Heitz, "Sampling the GGX Distribution of Visible Normals", 2018). alpha: along x and y.
 vec3 sample_visible_normal(vec3 v, vec2 alpha, vec2 xi) {

@@ -15,7 +15,7 @@ vec3 sample_direction(Surface s, vec3 xi) {
 float direction_density(Surface s, vec3 light_dir) {
     float share = lobe_share(s.f0, s.diffuse);
     vec3 half_vector = normalize(light_dir + s.view_dir);
-    float n = 4.0 * s.exponent, NoH = max(dot(s.normal, half_vector), 1e-6);
+    float n = 4.0 * s.exponent, NoH = max(abs(dot(s.normal, half_vector)), 1e-6);
     float lobe = (n + 1.0) / (2.0 * PI) * pow(NoH, n) / max(4.0 * abs(dot(s.view_dir, half_vector)), 1e-6);
     return share * lobe + (1.0 - share) * max(dot(s.normal, light_dir), 0.0) / PI;
 }

@@ -34,23 +34,21 @@ float specular_share(Surface s) {
 vec3 sample_direction(Surface s, vec3 xi) {
     mat3 frame = ggx_frame(s);
     if (xi.z >= specular_share(s)) return frame * sample_cosine(xi.xy);
-    vec3 v = s.view_dir * frame;
-    v.z = max(v.z, 1e-4);
-    return reflect(-s.view_dir, frame * sample_visible_normal(normalize(v), ggx_alphas(s), xi.xy));
+    vec3 v = viewer_above(s.view_dir * frame);
+    return frame * reflect(-v, sample_visible_normal(v, ggx_alphas(s), xi.xy));
 }
 
 float direction_density(Surface s, vec3 light_dir) {
     mat3 frame = ggx_frame(s);
-    vec3 v = s.view_dir * frame, half_vector = normalize(light_dir + s.view_dir), h = half_vector * frame;
-    v.z = max(v.z, 1e-4);
+    vec3 v = viewer_above(s.view_dir * frame), h = normalize(light_dir * frame + v);
     vec2 alpha = ggx_alphas(s);
     float share = specular_share(s), NoL = dot(s.normal, light_dir);
-    if (h.z <= 0.0 || dot(half_vector, s.view_dir) <= 0.0) return (1.0 - share) * max(NoL, 0.0) / PI;
-    float distribution = distribution_ggx(s.normal, half_vector, alpha.y);
+    if (h.z <= 0.0) return (1.0 - share) * max(NoL, 0.0) / PI;
+    float distribution = distribution_ggx(vec3(0.0, 0.0, 1.0), h, alpha.y);
 #ifdef NEEDS_GRAIN
     if (s.anisotropy > 0.0) distribution = distribution_ggx_anisotropic(h.z, h.x, h.y, alpha.x, alpha.y);
 #endif
-    return share * distribution * visible_normal_density(normalize(v), alpha) + (1.0 - share) * max(NoL, 0.0) / PI;
+    return share * distribution * visible_normal_density(v, alpha) + (1.0 - share) * max(NoL, 0.0) / PI;
 }
 #endif
 
