@@ -53,7 +53,8 @@ Surface scene_surface(int instance, int triangle, vec2 barycentrics, vec3 view_d
     vec3 normal = scene_normal_to_world(instance, scene_vertex_normal(v.x)) * w.x;
     normal += scene_normal_to_world(instance, scene_vertex_normal(v.y)) * w.y;
     normal += scene_normal_to_world(instance, scene_vertex_normal(v.z)) * w.z;
-    s.normal = normalize(normal);
+    // Objects that are scaled to a plane, and some files, have none.
+    s.normal = dot(normal, normal) > 1e-30 ? normalize(normal) : front;
 
     MaterialTexels texels = no_texels();
 #ifdef SCENE_TEXTURES
