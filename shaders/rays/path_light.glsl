@@ -58,8 +58,8 @@ bool is_wanted(int bounces) {
 }
 
 float power_heuristic(float density, float other) {
-    float a = density * density, b = other * other;
-    return a / max(a + b, 1e-37);
+    float ratio = other / max(density, 1e-37);  // squares of densities would overflow
+    return 1.0 / (1.0 + ratio * ratio);
 }
 
 vec3 reflected(Surface s, vec3 light_dir) {

@@ -213,6 +213,71 @@ def test_an_emissive_surface_lights_by_its_form_factor(
     assert image.mean(axis=(0, 1)) == pytest.approx(0.5 * factor * np.array([2, 4, 6]), rel=allowed)
 
 
+@pytest.mark.parametrize(("mode", "part"), [("blend", 0.25), ("mask", 0)])
+def test_a_lamp_emits_as_much_light_as_it_is_opaque(
+    session: rg.Session, tmp_path: Path, mode: str, part: float
+) -> None:
+    lamp = "{shape: plane, size: [1, 1], at: [0, 0.8, 0], rotate_degrees: [180, 0, 0], material: lamp}"
+    settings = {"max_bounces": 0, "samples": 64, "ambient": 0, "sources": "emissive"}
+    text = FLOOR.format(lamp=lamp).replace("[0, 0, 0], specular", f"[0, 0, 0, 0.25], alpha_mode: {mode}, specular")
+    expected = 0.5 * 4 * corner_form_factor(0.5, 0.5, 0.8) * part * np.array([2, 4, 6])
+    image = light(session, scene_file(tmp_path, text), settings, size=(16, 16))
+    assert image.mean(axis=(0, 1)) == pytest.approx(expected, rel=0.02)
+
+
+# Awkward surfaces ----------------------------------------------------------------------------------------------------
+
+
+def test_surfaces_that_turn_away_from_the_viewer_are_sampled_with_their_density(
+    session: rg.Session, tmp_path: Path
+) -> None:
+    """A tile whose vertex normals point 70 degrees aside: as much light as a sum over all directions finds."""
+    n = np.array([np.sin(np.radians(70)), np.cos(np.radians(70)), 0])
+    mesh = "v -1 0 -1\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nvn {} {} {}\nf 1//1 2//1 3//1 4//1\n".format(*n)
+    (tmp_path / "tile.obj").write_text(mesh)
+    text = """
+cameras: {main: {eye: [-4, 2, 0], target: [0, 0, 0], fov_y_degrees: 0.2}}
+lights: {none: {type: point, intensity: 0, at: [0, 9, 0]}}
+materials: {metal: {base_color: [0.9, 0.9, 0.9], metallic: 1, roughness: 0.4}}
+objects: {tile: {file: tile.obj, material: metal}}
+"""
+    settings = {"ambient": 1, "max_bounces": 0, "samples": 1024}
+    image = light(session, scene_file(tmp_path, text), settings, size=(8, 8))
+    y, phi = np.meshgrid((np.arange(800) + 0.5) / 800, 2 * np.pi * (np.arange(800) + 0.5) / 800)
+    r = np.sqrt(1 - y * y)
+    to_light = np.stack([r * np.cos(phi), y, r * np.sin(phi)], axis=-1)
+    v = np.array([-4, 2, 0]) / np.sqrt(20)
+    h = (to_light + v) / np.linalg.norm(to_light + v, axis=-1, keepdims=True)
+    NoL, NoV, NoH, VoH, a = np.maximum(to_light @ n, 0), 1e-4, np.maximum(h @ n, 0), h @ v, 0.4**2
+    spread = a * a / np.pi / ((np.cross(h, n) ** 2).sum(axis=-1) + (NoH * a) ** 2) ** 2
+    masked = 0.5 / (NoL * np.sqrt(NoV**2 * (1 - a * a) + a * a) + NoV * np.sqrt(NoL**2 * (1 - a * a) + a * a))
+    expected = 2 * np.pi * ((0.9 + 0.1 * (1 - VoH) ** 5) * spread * masked * NoL).mean()
+    assert image.mean() == pytest.approx(expected, rel=0.02)
+
+
+def test_light_is_the_same_at_any_scale(session: rg.Session, tmp_path: Path) -> None:
+    text = """
+cameras: {{main: {{eye: [0, {0}, {3}], target: [0, {0}, 0], near: {1}, far: {4}}}}}
+lights: {{sun: {{type: directional, direction: [0.8, -0.5, -0.6], intensity: 3}}}}
+materials: {{white: {{base_color: [0.8, 0.8, 0.8], specular: 0, roughness: 1}}}}
+objects:
+  floor: {{shape: plane, size: [{2}, {2}], material: white}}
+  wall: {{shape: plane, size: [{2}, {2}], at: [0, {0}, -{0}], rotate_degrees: [90, 0, 0], material: white}}
+"""
+    images = []
+    for scale in (1, 4096):
+        scaled = text.format(*(scale * length for length in (1, 0.05, 2, 3.2, 50)))
+        settings = {"ambient": 0.2, "max_bounces": 1, "samples": 16}
+        images.append(light(session, scene_file(tmp_path, scaled), settings, size=(32, 18)))
+    assert np.isclose(images[1], images[0], atol=1e-4).mean() > 0.99  # but for edges
+    assert images[1].mean() == pytest.approx(images[0].mean(), rel=1e-3)
+
+
+def test_objects_that_are_scaled_to_a_plane_have_normals(session: rg.Session, tmp_path: Path) -> None:
+    text = "objects: {flat: {shape: box, scale: [1, 0, 1]}}\n"
+    assert light(session, scene_file(tmp_path, text), {"samples": 4}, size=(16, 9)).max() > 0.05
+
+
 # Noise ---------------------------------------------------------------------------------------------------------------
 
 
