@@ -151,10 +151,12 @@ def test_of(annotation: Any) -> Callable[[Any], bool]:
     if annotation is None:
         return lambda value: value is None
     if origin is Annotated:
-        rules = [rule.accepts for rule in _rules(annotation, Range, Length, Known, Matching)]
-        return reduce(_both, rules, test_of(annotation.__origin__))
+        tests = [test_of(annotation.__origin__)]
+        tests += [rule.accepts for rule in _rules(annotation, Range, Length, Known, Matching)]
+        return tests[0] if len(tests) == 1 else lambda value: all(test(value) for test in tests)
     if origin in (Union, types.UnionType):
-        return reduce(_either, map(test_of, arguments))
+        tests = [test_of(part) for part in arguments]
+        return lambda value: any(test(value) for test in tests)
     if origin is Literal:
         return lambda value: any(type(value) is type(choice) and value == choice for choice in arguments)
     if origin is tuple and Ellipsis not in arguments:
@@ -179,20 +181,13 @@ def test_of(annotation: Any) -> Callable[[Any], bool]:
     return lambda value: isinstance(value, kind)
 
 
-def _both(one: Callable[[Any], bool], other: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    return lambda value: one(value) and other(value)
-
-
-def _either(one: Callable[[Any], bool], other: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    return lambda value: one(value) or other(value)
-
-
 @cache
 def conversion_to(annotation: Any) -> Callable[[Any], Any]:
     """Return the function that makes a file's value one of an annotation: a list a tuple, a whole number a float."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
-        return reduce(_after, (rule.by for rule in _rules(annotation, Converted)), conversion_to(annotation.__origin__))
+        steps = [conversion_to(annotation.__origin__), *(rule.by for rule in _rules(annotation, Converted))]
+        return steps[0] if len(steps) == 1 else lambda value: reduce(lambda found, step: step(found), steps, value)
     if origin in (Union, types.UnionType):
         parts = [(conversion_to(part), test_of(part)) for part in arguments]
         return lambda value: next((found for convert, test in parts if test(found := convert(value))), value)
@@ -209,10 +204,6 @@ def conversion_to(annotation: Any) -> Callable[[Any], Any]:
     if annotation is float:
         return lambda value: float(value) if fits(value, int) and abs(value) <= LARGEST else value
     return lambda value: value
-
-
-def _after(first: Callable[[Any], Any], second: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    return lambda value: second(first(value))
 
 
 # --- words and schema ------------------------------------------------------------------------------------------------
