@@ -259,7 +259,7 @@ class TextureInference:
         if samples is None:
             samples = 1 if mips > 1 or kind in ("texture3d", "texture_cube") else self._samples_of(draft, like, size)
         if kind == "texture2d" and layers != 1:
-            self._stop(end, "RG208", f"a {kind} cannot have {layers} layers")
+            self._stop(end, "RG208", f"a texture2d has 1 layer, not {layers}; the kind with layers is texture2d_array")
         if mips > full:
             self._stop(end, "RG208", f"a texture of {size[0]}×{size[1]} has 1 to {full} mips, not {mips}")
         if samples > 1 and (mips > 1 or kind in ("texture3d", "texture_cube")):

@@ -6,9 +6,12 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
+import pytest
+
 from rendergraph.api import Depth, Facts, Input, Node, Output, Radiance, ShadowMap, View, Views
 from rendergraph.catalog import Catalog
 from rendergraph.declare import LightFacts
+from rendergraph.errors import InputError
 from rendergraph.expand import ViewTable, expand
 from rendergraph.link import Endpoint, link
 from rendergraph.read import read
@@ -166,3 +169,15 @@ def test_a_port_without_a_rule_is_as_it_says() -> None:
     catalog = Catalog.of(Plain)
     graph = link(resolve(read(None, "nodes: {a: {type: plain}}\noutputs: {c: a.color}"), catalog=catalog), catalog)
     assert graph["a"].clears == {"color": (0.0, 0.5, 1.0), "rest": None}
+
+
+def test_a_plain_texture_has_no_layers() -> None:
+    class Flat(Node):
+        """A node."""
+
+        color = Output(Radiance, layers=3, doc="Colour.")
+
+    catalog = Catalog.of(Flat)
+    resolved = resolve(read(None, "nodes: {a: {type: flat}}\noutputs: {c: a.color}"), catalog=catalog)
+    with pytest.raises(InputError, match=r"RG208 .* 1 layer, not 3; the kind with layers is texture2d_array"):
+        link(resolved, catalog)
