@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
+from pathlib import Path
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -29,14 +30,7 @@ COLORS = {
 }
 GREY = "#7d8590"
 
-STYLE = """
-svg:root{max-width:100%;height:auto}
-.card{fill:#ffffff;stroke:#7d8590}.head{fill:#e6eaef}.name{fill:#1f2328;font-weight:600;font-size:13px}
-.type{fill:#57606a}.port{fill:#1f2328}.fact{fill:#57606a}.unused{opacity:.5}
-.mark{fill-opacity:.1;stroke-width:2.5}.note{font-weight:600}.pointed{stroke-width:3}
-@media (prefers-color-scheme:dark){.card{fill:#1c2128}.head{fill:#2d333b}.name,.port{fill:#e6edf3}
-.type,.fact{fill:#9aa4af}}
-"""
+STYLE = "\n" + Path(__file__).with_suffix(".css").read_text(encoding="ascii")
 
 
 class Mark(Struct, frozen=True):

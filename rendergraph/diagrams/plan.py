@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 from itertools import accumulate, groupby
+from pathlib import Path
 from typing import Any
 
 from rendergraph.allocate import ResourcePlan
@@ -216,12 +217,7 @@ USES = {
     "B": ("#c2851c", "reads and writes"),
     "P": ("#3b7dd8", "reads last frame's value"),
 }
-STYLE = """
-svg:root{max-width:100%;height:auto}
-.ink{fill:#1f2328}.fact{fill:#57606a}.band{fill:#7d8590;opacity:.12}.alive{fill:#7d8590;opacity:.45}.bar{fill:#7d8590}
-.peak{fill:#d0453e}.bound{stroke:#2c9163;stroke-dasharray:4 3}.use{fill:#ffffff;font-weight:600}
-@media (prefers-color-scheme:dark){.ink{fill:#e6edf3}.fact{fill:#9aa4af}}
-"""
+STYLE = "\n" + Path(__file__).with_suffix(".css").read_text(encoding="ascii")
 
 
 def lifetimes_svg(plan: ResourcePlan) -> str:

@@ -7,19 +7,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 
 WIDTH, HEIGHT = 760.0, 380.0
 LEFT, RIGHT, TOP, BOTTOM = 76.0, 36.0, 20.0, 52.0
 MOST_LABELS = 24
 _LINE = 13.0
 """Height of a label."""
-_STYLE = """
-svg:root{max-width:100%;height:auto}
-.ink{fill:#1f2328}.fact{fill:#57606a}.grid{stroke:#7d8590;stroke-opacity:.25}.front{stroke:#2c9163;fill:none}
-.dot{fill:#3b7dd8}.best{fill:#2c9163}
-@media (prefers-color-scheme:dark){.ink{fill:#e6edf3}.fact{fill:#9aa4af}.dot{fill:#6ea8ff}.best{fill:#4fc08d}
-.front{stroke:#4fc08d}}
-"""
+_STYLE = "\n" + Path(__file__).with_suffix(".css").read_text(encoding="ascii")
 
 
 @dataclass(frozen=True)
