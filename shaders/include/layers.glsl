@@ -35,12 +35,6 @@ void material_layers(inout Surface s, MaterialData m, LayerTexels texels, float 
     s.absorption = m.absorption.rgb;
     s.diffuse *= 1.0 - s.transmission;
     s.ambient *= 1.0 - s.transmission;
-#ifndef TRANSMITS  // without a picture of what is behind, the surface is blended over it
-    float opacity = 1.0 - s.transmission * (1.0 - fresnel_schlick(vec3(s.dielectric.r), 1.0, NoV).r);
-    s.alpha *= opacity;
-    s.diffuse /= max(opacity, 1e-3);
-    s.emissive /= max(opacity, 1e-3);
-#endif
 #endif
 #ifdef IRIDESCENCE_LAYER
     s.iridescence = m.iridescence.x * texels.iridescence.x;
@@ -48,6 +42,19 @@ void material_layers(inout Surface s, MaterialData m, LayerTexels texels, float 
     s.film_thickness = mix(m.iridescence.z, m.iridescence.w, texels.iridescence.y);
     vec3 film = film_reflectance(s.film_ior, s.film_thickness, s.f0, NoV);
     s.film_f0 = mix(s.f0, schlick_f0(film, NoV), s.iridescence);
+#endif
+#ifdef TRANSMISSION_LAYER
+#ifndef TRANSMITS  // without a picture of what is behind, the surface is blended over it, with all that it reflects
+    float opacity = max(1.0 - s.transmission * (1.0 - fresnel_schlick(vec3(s.dielectric.r), 1.0, NoV).r), 1e-3);
+    s.alpha *= opacity;
+    s.diffuse /= opacity;
+    s.emissive /= opacity;
+    s.f0 /= opacity;
+    s.f90 /= opacity;
+#ifdef IRIDESCENCE_LAYER
+    s.film_f0 /= opacity;
+#endif
+#endif
 #endif
 #ifdef SHEEN_LAYER
     s.sheen_color = m.sheen.rgb * texels.sheen.rgb;

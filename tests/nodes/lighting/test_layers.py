@@ -121,6 +121,19 @@ def test_light_of_a_lamp_on_coat_and_sheen(drawn: Callable[..., Floats], pipelin
     np.testing.assert_allclose(both, below + 3 * lobe * n_l, atol=0.006 * both.max())
 
 
+def test_light_of_a_lamp_below_sheen(drawn: Callable[..., Floats]) -> None:
+    """The base is left what sheen does not reflect towards lamp or viewer, whichever is less."""
+    normal, light, view = ball(), np.array([0.3, 0.4, 1]) / np.linalg.norm([0.3, 0.4, 1]), np.array([0, 0, 1.0])
+    lit = (normal @ light > 0.2) & (normal @ view > 0.2)
+    n_l, n_v = (normal[lit] @ light)[::23], (normal[lit] @ view)[::23]
+    n_h = (normal[lit] @ ((light + view) / np.linalg.norm(light + view)))[::23]
+    albedo = [max(sheen_albedo(0.8, one), sheen_albedo(0.8, other)) for one, other in zip(n_l, n_v, strict=True)]
+    expected = 3 * n_l * ((1 - 0.9 * np.array(albedo)) / np.pi + 0.5 * charlie(n_l, n_v, n_h, 0.8))
+    paint = "base_color: 1, specular: 0, sheen_color: [0.5, 0.9, 0.2], sheen_roughness: 0.8"
+    found = drawn("forward", paint)[lit][::23, 0]
+    np.testing.assert_allclose(found, expected, atol=0.006 * expected.max())
+
+
 def test_sheen_is_the_published_lobe_and_reciprocal(evaluate: Evaluate) -> None:
     random = np.random.default_rng(5)
     n_l, n_v = random.uniform(0.02, 1, (2, 500))
@@ -213,20 +226,26 @@ def test_a_turned_pane_moves_what_is_behind_it_by_snells_law(session: rg.Session
     angle, ior, thickness = np.radians(35), 1.5, 0.5
     sets = ("light.environment=null", "light.ambient=0", "light.terms=all")
 
-    def row(roughness: float) -> Floats:
-        values = f"base_color: 1, ior: {ior}, thickness: {thickness}"
+    def row(roughness: float, dispersion: float = 0) -> Floats:
+        values = f"base_color: 1, ior: {ior}, thickness: {thickness}, dispersion: {dispersion}"
         text = WINDOW % (35, "false", roughness, values)
         (tmp_path / "window.yaml").write_text(text.replace("  pane: {shape", "  other: {hidden: true, shape"))
         loaded = rg.load("forward", scene=tmp_path / "window.yaml", sets=sets, size=(200, 200))
-        return np.asarray(session.render(loaded, outputs=["radiance"])["radiance"], np.float64)[100, :, 0]
+        return np.asarray(session.render(loaded, outputs=["radiance"])["radiance"], np.float64)[100]
 
-    sharp = row(0)
+    def edge_of(channel: Floats) -> float:
+        """Metres from the middle of the picture."""
+        return abs(int(np.argmax(np.abs(np.diff(channel[30:170])))) - 69) / 100
+
+    sharp = row(0)[:, 0]
     # A ray along -z is bent towards the pane's normal, so it leaves the volume to the side by this much.
-    inner = np.arcsin(np.sin(angle) / ior)
-    shift = thickness * np.sin(angle - inner)
+    shifts = [thickness * np.sin(angle - np.arcsin(np.sin(angle) / n)) for n in (ior, ior - 0.25, ior + 0.25)]
     inside = sharp[30:170]
-    edge = 30 + int(np.argmax(np.abs(np.diff(inside)))) + 1
-    assert abs(edge - 100) / 100 == pytest.approx(shift, abs=0.011)
+    assert edge_of(sharp) == pytest.approx(shifts[0], abs=0.011)
+    dispersed = row(0, 20)
+    edges = [edge_of(dispersed[:, channel]) for channel in (1, 0, 2)]
+    assert edges == pytest.approx(shifts, abs=0.011)
+    assert edges[1] < edges[0] < edges[2], "blue is refracted most"
     assert 0.7 < inside.max() < 0.8, "less what the pane reflects"
-    blurred = row(0.3)[30:170]
+    blurred = row(0.3)[30:170, 0]
     assert np.abs(np.diff(blurred)).max() < 0.2 * np.abs(np.diff(inside)).max()
