@@ -231,7 +231,8 @@ def test_a_turned_pane_moves_what_is_behind_it_by_snells_law(session: rg.Session
         text = WINDOW % (35, "false", roughness, values)
         (tmp_path / "window.yaml").write_text(text.replace("  pane: {shape", "  other: {hidden: true, shape"))
         loaded = rg.load("forward", scene=tmp_path / "window.yaml", sets=sets, size=(200, 200))
-        return np.asarray(session.render(loaded, outputs=["radiance"])["radiance"], np.float64)[100]
+        drawn = np.asarray(session.render(loaded, outputs=["radiance"])["radiance"], np.float64)
+        return np.asarray(drawn[100])
 
     def edge_of(channel: Floats) -> float:
         """Metres from the middle of the picture."""
@@ -249,3 +250,23 @@ def test_a_turned_pane_moves_what_is_behind_it_by_snells_law(session: rg.Session
     assert 0.7 < inside.max() < 0.8, "less what the pane reflects"
     blurred = row(0.3)[30:170, 0]
     assert np.abs(np.diff(blurred)).max() < 0.2 * np.abs(np.diff(inside)).max()
+
+
+def test_emission_shines_through_the_coat(drawn: Callable[..., Floats]) -> None:
+    n_v = ball()[..., 2]
+    picture = drawn("forward", "emissive: [0.5, 0.5, 0.5], clearcoat: 0.8", "light.terms=emissive")[n_v > 0.1][:, 0]
+    reflected = 0.8 * (0.04 + 0.96 * (1 - n_v[n_v > 0.1]) ** 5)
+    np.testing.assert_allclose(picture, 0.5 * (1 - reflected), atol=5e-3)
+
+
+def test_a_lamp_on_a_film_is_seen_in_the_films_colour(drawn: Callable[..., Floats]) -> None:
+    """Viewer and light are the same all over the ball, and so is the angle to the half vector."""
+    paint = "base_color: 0.5, metallic: 1, roughness: 0.6, iridescence_ior: 1.4, iridescence_thickness: [100, 300]"
+    plain, coloured = (drawn("forward", f"{paint}, iridescence: {factor}") for factor in (0, 1))
+    light = np.array([0.3, 0.4, 1]) / np.linalg.norm([0.3, 0.4, 1])
+    cosine = float(np.sqrt((1 + light[2]) / 2))
+    lit = plain[..., 0] > 0.1
+    ratio = coloured[lit] / plain[lit]
+    expected = film(1.4, 300, 0.5, cosine) / (0.5 + 0.5 * (1 - cosine) ** 5)
+    np.testing.assert_allclose(ratio, np.broadcast_to(expected, ratio.shape), atol=0.08)
+    assert np.ptp(expected) > 0.2
