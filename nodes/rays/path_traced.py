@@ -170,7 +170,7 @@ class PathTraced(Node):
         """Record the steps that add paths to the mean."""
         reads: dict[str, Any] = {"scene": self.scene}
         batch = _BATCH if self.samples % _BATCH == 0 else 1
-        defines: dict[str, Any] = {"BATCH": batch}
+        defines: dict[str, Any] = {"BATCH": batch, "SAMPLES_DIRECTIONS": 1}
         if steps.connected(self.environment):
             reads |= {"environment": self.environment, "environment_table": self.environment_table}
             reads["environment_tree"] = self.environment_tree

@@ -20,6 +20,7 @@ from rendergraph.program.checks import check_scene_includes as check_scene_inclu
 from rendergraph.program.checks import check_texts as check_texts
 from rendergraph.program.checks import missing as missing
 from rendergraph.program.checks import named_reads as named_reads
+from rendergraph.program.checks import ray_warnings as ray_warnings
 from rendergraph.program.checks import unfit_outputs as unfit_outputs
 from rendergraph.program.checks import unfit_sampler as unfit_sampler
 from rendergraph.program.checks import used_blocks as used_blocks

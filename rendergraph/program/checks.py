@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache, partial
 
 from rendergraph.catalog import NodeType
-from rendergraph.declare import Input, Node
-from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.declare import Node
+from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
 from rendergraph.expand import ViewTable
 from rendergraph.glsl.globals import declared_blocks, declared_samplers, globals_of
 from rendergraph.glsl.reachable import reachable_names
@@ -173,12 +173,28 @@ def _check_outs(step: Step, texts: Mapping[str, StageText], cls: type[Node], res
             raise InputError([_placed(problem, text, [problem.subject]) for problem in problems])
 
 
+def _traces(step: Step, types: Mapping[str, NodeType]) -> bool:
+    nodes = [step.node, *(function.node for function in step.functions)]
+    return step.reads_scene and any(port.rays for node in nodes for port in types[node].read.values())
+
+
+def ray_warnings(steps: Iterable[Step], types: Mapping[str, NodeType]) -> Iterator[Problem]:
+    """Yield warnings about what rays miss: vertices that a plugin moves (RG625), and narrow highlights (RG626)."""
+    traced = [step for step in steps if _traces(step, types)]
+    for step in steps if traced else ():
+        vertex = dict(step.shaders).get("vertex", "<")
+        if step.kind == "geometry" and not step.in_place and vertex[0] != "<" and types[step.node].plugin != "builtin":
+            text = f"rays of '{traced[0].node}' miss vertices that {vertex} moves; in_place=True says it moves none"
+            yield step.problem("RG625", text).as_warning()
+        for _, file in step.includes if "SAMPLES_DIRECTIONS" in dict(step.defines) else ():
+            if "HAS_SAMPLED_DIRECTIONS" not in file.read_text(encoding="utf-8"):
+                text = f"'{step.node}' samples directions by the cosine, because this model does not choose them"
+                yield Problem("RG626", text, Place(shown_file(file)), severity="warning")
+
+
 def check_scene_includes(step: Step, texts: Mapping[str, StageText], types: Mapping[str, NodeType]) -> None:
     """Refuse includes about the scene's data in steps that do not read it (RG430)."""
-    nodes = [step.node, *(function.node for function in step.functions)]
-    inputs = [port for node in nodes for port in types[node].cls.inputs().values() if isinstance(port, Input)]
-    traces = step.reads_scene and any(port.rays for port in inputs)
-    problems = []
+    traces, problems = _traces(step, types), []
     for text in texts.values():
         for block in text.source.blocks:
             name, origin = block.origin.file.name if block.origin.file is not None else "", block.origin

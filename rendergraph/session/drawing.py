@@ -14,6 +14,7 @@ from rendergraph.errors import Place, Problem, RenderError
 from rendergraph.execute import FrameTimes, Runner
 from rendergraph.images import PictureInfo, channel_names
 from rendergraph.installed import versions
+from rendergraph.program import ray_warnings
 from rendergraph.scene import animate
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import Camera, Scene
@@ -139,16 +140,20 @@ class Drawing(Struct, eq=False, dict=True):
             culled=dict(plan.schedule.culled),
             metadata={**self._metadata, **frame_metadata(self.number, self.expanded.options.fps)},
             times=tuple(self.times),
-            warnings=(*dict.fromkeys(self.gpu.cache.image_warnings), *self._single_frame_warnings()),
+            warnings=(*dict.fromkeys(self.gpu.cache.image_warnings), *self._single_frame_warnings(), *self._ray_notes),
         )
 
     def _single_frame_warnings(self) -> Iterator[Problem]:
         """Yield a warning if a single frame is rendered of a pipeline that accumulates frames."""
         node = self.runner.jittering
         if node is not None and self.expanded.options.frames == range(1, 2):
-            text = f"'{node}' accumulates over frames, but only frame 1 was rendered"
-            text += "; --frames 16-16 shows more"
+            text = f"'{node}' accumulates over frames, but only frame 1 was rendered; --frames 16-16 shows more"
             yield Problem("RG620", text, Place(self.expanded.linked.graph.name), severity="warning")
+
+    @cached_property
+    def _ray_notes(self) -> tuple[Problem, ...]:
+        types = {node.id: node.type for node in self.expanded.linked.graph.nodes}
+        return tuple(ray_warnings(self.executable.plan.schedule.steps, types))
 
     @cached_property
     def _rendering_nodes(self) -> tuple[str, ...]:

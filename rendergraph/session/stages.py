@@ -160,12 +160,12 @@ def plan(expanded: Expanded) -> Planned:
 
 def check(linked: Linked) -> Planned:
     """Find every mistake that can be found without GL, for all outputs of the file."""
-    from rendergraph.program import check_texts
+    from rendergraph.program import check_texts, ray_warnings
 
     planned = plan(expand(linked))
     types = {node.id: node.type for node in linked.graph.nodes}
     warnings = check_texts(planned.plan.schedule.steps, types, planned.plan.resources, planned.expansion.views)
-    return replace(planned, warnings=warnings)
+    return replace(planned, warnings=(*warnings, *ray_warnings(planned.plan.schedule.steps, types)))
 
 
 def check_profile(planned: Planned) -> None:

@@ -5,7 +5,6 @@
 //
 // Each invocation follows the paths of its pixel one after the other in a single loop: one step is one ray and its
 // shadow ray, so that neighbours that run in lockstep are busy although their paths have different lengths.
-#define SAMPLES_DIRECTIONS
 #include <frame.glsl>
 #include "camera_ray.glsl"
 #include "path_ends.glsl"
