@@ -167,7 +167,9 @@ def _check_outs(step: Step, texts: Mapping[str, StageText], cls: type[Node], res
     """Check the outputs that a text always declares; an `out` inside `#if` belongs to another step or variant."""
     if "fragment" in texts:
         text = texts["fragment"]
-        outs = {found.name: found.type for found in globals_of(_always(text.text)).declared if found.storage == "out"}
+        parts = [part for part in re.split("[;{}]", _always(text.text)) if "out" in part]  # the rest takes long to read
+        declared = globals_of(";\n".join([*parts, ""])).declared
+        outs = {found.name: found.type for found in declared if found.storage == "out"}
         problems = unfit_outputs(step, outs, cls, resources)
         if problems:
             raise InputError([_placed(problem, text, [problem.subject]) for problem in problems])
