@@ -20,7 +20,7 @@ vec3 film_sensitivity(float path, vec3 shift) {
     return xyz_to_srgb * xyz;
 }
 
-// Reflectance at normal incidence between two indices of refraction.
+// Reflectance at normal incidence between two indices of refraction, `inside` and `outside`.
 vec3 interface_f0(vec3 inside, float outside) {
     vec3 ratio = (inside - outside) / (inside + outside);
     return ratio * ratio;

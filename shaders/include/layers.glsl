@@ -69,7 +69,8 @@ void material_layers(inout Surface s, MaterialData m, LayerTexels texels, float 
 }
 
 #ifdef SHEEN_LAYER
-// Fraction of uniform light that white sheen reflects to a direction, before it is limited to 1.
+// Fraction of uniform light that white sheen reflects to a direction with this `cosine` to the normal, before it is
+// limited to 1.
 float sheen_albedo(Surface s, float cosine) {
     return 4.0 * textureLod(brdf_table, vec2(sqrt(clamp(cosine, 0.0, 1.0)), s.sheen_roughness), 0.0).z;
 }

@@ -10,7 +10,7 @@ float distribution_charlie(float NoH, float roughness) {
     return (2.0 + exponent) * pow(max(1.0 - NoH * NoH, 1e-7), 0.5 * exponent) / (2.0 * PI);
 }
 
-// The fit of the paper to the masking of one direction, for cosines from 0 to 0.5.
+// The fit of the paper to the masking of a direction with this `cosine` to the normal, 0 to 0.5.
 float charlie_fit(float cosine, float alpha) {
     float t = (1.0 - alpha) * (1.0 - alpha);
     float a = mix(21.5473, 25.3245, t), b = mix(3.82987, 3.32435, t), c = mix(0.19823, 0.16801, t);

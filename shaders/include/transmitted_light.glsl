@@ -29,7 +29,7 @@ vec3 blurred_picture(vec2 uv, float level) {
     return mix(sums[0], sums[1], level - lower);
 }
 
-// Radiance that reaches the surface from behind it with this index of refraction, before it is tinted.
+// Radiance that reaches the surface from behind it with `ior` as index of refraction, before it is tinted.
 vec3 refracted_light(Surface s, float ior) {
     vec3 ray = refract(-s.view_dir, s.normal, 1.0 / ior);
     vec4 clip = PASS_VIEW.view_projection * vec4(s.position + ray * s.thickness, 1.0);
