@@ -1,6 +1,6 @@
 // One pass of the variance-guided à-trous filter: 5×5 texels that are `stride` apart, weighted by a B-spline, by plane
-// and normal, and by the difference of luminance over its standard deviation (Schied et al. 2017). The distance from the
-// tangent plane stands for the depth gradient of the original.
+// and normal, and by the difference of luminance over its standard deviation (Schied et al. 2017). The distance from
+// the tangent plane stands for the depth gradient of the original.
 #include "surfaces.glsl"
 #include "svgf_albedo.glsl"
 #include <luminance.glsl>

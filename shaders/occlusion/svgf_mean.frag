@@ -1,5 +1,5 @@
-// The temporal half of SVGF: light over albedo and the moments of its luminance, as means over frames (C. Schied et al.,
-// "Spatiotemporal Variance-Guided Filtering", 2017).
+// The temporal half of SVGF: light over albedo and the moments of its luminance, as means over frames (C. Schied et
+// al., "Spatiotemporal Variance-Guided Filtering", 2017).
 #include "reprojection.glsl"
 #include "svgf_albedo.glsl"
 #include <luminance.glsl>
