@@ -168,8 +168,10 @@ def test_a_schema_of_a_file_is_written_anew_for_that_file(
     )
 
 
-RADIANCES = ("light.radiance", "light.diffuse", "gi.radiance", "gi.indirect", "gi.reflected")
-RADIANCES += ("light.direct_diffuse", "light.direct_specular", "light.environment_reflection")
+RADIANCES = (
+    *("light.radiance", "light.diffuse", "gi.radiance", "gi.indirect", "gi.reflected"),
+    *("light.direct_diffuse", "light.direct_specular", "light.environment_reflection"),
+)
 
 
 def test_a_schema_of_a_file_offers_the_links_that_fit(

@@ -236,7 +236,9 @@ class Lighting(Node):
         if through and "phong" not in steps.needs("shading") and "nothing" not in steps.needs("shading"):
             objects = [one.name for one in steps.facts.objects if one.blended and not one.hidden and not transmits(one)]
             self.copy_behind(steps, out["radiance"])
-            table = {"brdf_table": self.brdf_table.sampled("linear")} if self.environment_reads(steps) else {}
+            behind: dict[str, Any] = reads | {"behind": self.behind.sampled("trilinear")}
+            if self.environment_reads(steps):
+                behind["brdf_table"] = self.brdf_table.sampled("linear")
             steps.geometry(
                 fragment,
                 vertex=vertex,
@@ -247,7 +249,7 @@ class Lighting(Node):
                 view=view,
                 defines={"TRANSMITS": 1},
                 label="transmissive",
-                **reads | table | {"behind": self.behind.sampled("trilinear")},
+                **behind,
             )
             if not objects:
                 return
@@ -414,7 +416,8 @@ def draws_backdrop(node: SurfaceLighting, facts: Facts) -> bool:
 
 def background_color(node: GeometryLighting) -> tuple[float, float, float]:
     """Return the background as RGB."""
-    return node.background if isinstance(node.background, tuple) else (node.background,) * 3
+    color = node.background
+    return color if isinstance(color, tuple) else (color, color, color)
 
 
 def background_texel(node: GeometryLighting, facts: Facts) -> tuple[float, ...]:

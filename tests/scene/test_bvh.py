@@ -121,7 +121,7 @@ def test_a_refitted_tree_has_the_boxes_of_what_has_moved() -> None:
         if reference >= 0:
             return [one for child in tree.children[reference] for one in below(int(child))]
         first, more = divmod(-1 - reference, LEAF)
-        return tree.order[first : first + more + 1].tolist()
+        return [int(triangle) for triangle in tree.order[first : first + more + 1]]
 
     for node, children in enumerate(tree.children):
         for side, child in enumerate(children):

@@ -99,7 +99,7 @@ class Reference:
                 found = power_between(keys[k], keys[k + 1], t)
             else:
                 found = (1 - t) * keys[k] + t * keys[k + 1]
-        return found / np.linalg.norm(found) if path == "rotation" else found
+        return np.asarray(found / np.linalg.norm(found) if path == "rotation" else found)
 
     def pose(self, clip: int, time: float) -> tuple[list[Doubles], list[Doubles]]:
         """World matrices and weights of all nodes."""
@@ -111,9 +111,10 @@ class Reference:
                 nodes[channel["target"]["node"]][channel["target"]["path"]] = self.sampled(
                     animation, channel, time % length
                 )
-        worlds = []
+        worlds: list[Doubles] = []
         for number in range(len(nodes)):
-            world, at = np.eye(4), number
+            world: Doubles = np.eye(4)
+            at: int | None = number
             while at is not None:
                 world, at = self.local(nodes[at]) @ world, self.parents.get(at)
             worlds.append(world)
@@ -403,7 +404,7 @@ def creature(
 
 
 def unit_rows(rows: Doubles) -> Doubles:
-    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
 
 
 @pytest.mark.parametrize(
@@ -734,7 +735,7 @@ def test_what_stands_still_stays_the_same_object(tmp_path: Path) -> None:
 # Broken files ----------------------------------------------------------------------------------------------------------
 
 
-def _without_view(file: File, number: int, **changes: Any) -> None:
+def _without_view(file: File, number: int, **changes: Any) -> Any:
     """Make an accessor one of zeros."""
     file.json["accessors"][number].pop("bufferView")
     file.json["accessors"][number] |= changes
