@@ -65,6 +65,7 @@ def culled_reasons(steps: Sequence[Step], kept: Sequence[Step], versions: Versio
     """Return node id to why none of its steps runs."""
     running = {step.node for step in kept}
     running |= {step.view.rpartition(".")[0] for step in kept if step.view}  # a node that only sets a view
+    running |= {function.node for step in kept for function in step.functions}  # or that others call
     culled: dict[str, str] = {}
     for node in dict.fromkeys(step.node for step in steps):
         if node in running:

@@ -187,6 +187,11 @@ def test_a_node_loses_only_the_steps_nobody_needs() -> None:
     assert found.culled == {}
 
 
+def test_a_node_whose_function_is_called_is_not_said_to_do_nothing() -> None:
+    calls = replace(step("show", (), ("show.x",)), functions=(FunctionBinding("air_at", "fog", "fog.glsl"),))
+    assert schedule(expansion(step("fog"), step("idle"), calls)).culled == {"idle": "it writes nothing"}
+
+
 def test_a_whole_clear_needs_nothing_of_before_but_a_part_does() -> None:
     first, second = step("first", (), ("t.x",)), step("second")
     show = step("show", ("t.x:2",), ("show.x",))
