@@ -188,7 +188,7 @@ def test_a_node_loses_only_the_steps_nobody_needs() -> None:
 
 
 def test_a_node_whose_function_is_called_is_not_said_to_do_nothing() -> None:
-    calls = replace(step("show", (), ("show.x",)), functions=(FunctionBinding("air_at", "fog", "fog.glsl"),))
+    calls = replace(step("show", (), ("show.x",)), functions=(FunctionBinding("air_at", "fog", "fog.glsl", ()),))
     assert schedule(expansion(step("fog"), step("idle"), calls)).culled == {"idle": "it writes nothing"}
 
 
