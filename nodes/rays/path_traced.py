@@ -106,6 +106,9 @@ class PathTraced(Node):
         mips=0,
         doc="Power of each emitting triangle.",
     )
+    brdf_table = Internal(
+        AnyTexel, format="rg16", size=(64, 64), kept=True, doc="Split-sum BRDF factors, for a shared diffuse lobe."
+    )
     first_depth = Internal(Depth, format="depth32f", clear=0.0, doc="The depth if nobody reads it.")
 
     shading: Literal["unlit", "phong", "blinn_phong", "anisotropic", "pbr"] | str = define(
@@ -116,6 +119,10 @@ class PathTraced(Node):
     )
     smith: Literal["exact", "fast"] = define(
         default="exact", doc="Visibility term of `pbr`: Smith, or a fit without square roots."
+    )
+    diffuse_lobe: Literal["lambert", "shared"] = define(
+        default="lambert",
+        doc="Diffuse lobe of `pbr`: of all the light, or of the share that the specular lobe does not reflect.",
     )
     terms: Literal["all", "diffuse", "specular"] = define(
         default="all", doc="Reflect light by all lobes of the materials, or by one kind alone."
@@ -184,6 +191,13 @@ class PathTraced(Node):
                 label="environment",
             )
             self._add_tree(steps, self.environment_table, self.environment_tree, 0)
+        needs = steps.needs("shading")
+        if self.diffuse_lobe == "shared" and "phong" not in needs and "nothing" not in needs:
+            reads["brdf_table"] = self.brdf_table.sampled("linear")
+            defines["MULTIPLE_SCATTERING"] = 0
+            steps.fullscreen(
+                "../lighting/brdf_table.frag", out=self.brdf_table, defines={"TABLE_SAMPLES": 512}, label="table"
+            )
         emits = _emitters(steps.facts) > 0 and self.sources in ("all", "emissive")
         if emits:
             side = _table_side(self, steps.facts)

@@ -67,6 +67,7 @@ void main() {
             bool is_front = dot(front, direction) < 0.0, is_double_sided = (flags & SCENE_DOUBLE_SIDED) != 0;
             // A back that geometry passes do not show is there for all rays but the camera's.
             if (!is_front && !is_double_sided) s.normal = -s.normal;
+            share_energy(s);
             bool passes = vertex == 0 && !is_front && !is_double_sided;
 #ifdef SCENE_ANY_MASKED
             float cutoff = materials[MATERIAL_INDEX(scene_instances[hit.instance].material)].emissive.a;

@@ -160,6 +160,16 @@ def test_every_lobe_reflects_its_albedo_within_three_per_mille(
     assert found == pytest.approx(albedos(degrees), rel=0.003)
 
 
+@pytest.mark.parametrize("degrees", [0, 60])
+def test_a_shared_diffuse_lobe_reflects_what_the_specular_lobe_leaves(
+    session: rg.Session, tmp_path: Path, degrees: float
+) -> None:
+    found = furnace(session, tmp_path, {"diffuse_lobe": "shared"}, degrees, 256)
+    specular = microfacets(0.3, np.radians(degrees), 0.04)
+    assert found["plastic"] == pytest.approx(0.5 * (1 - specular) + specular, rel=0.01)
+    assert found["metal"] == pytest.approx(albedos(degrees)["metal"], rel=0.01)
+
+
 @pytest.mark.parametrize(("model", "highlight"), [("phong", phong_highlight), ("blinn_phong", blinn_highlight)])
 def test_empirical_models_reflect_no_more_than_they_say(
     session: rg.Session, tmp_path: Path, model: str, highlight: Any
