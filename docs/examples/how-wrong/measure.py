@@ -1,0 +1,192 @@
+"""Hold every technique against its traced twin: `python measure.py [FOLDER] [shadows] [occlusion] [light]`.
+
+Tables go to stdout. A folder gets four pictures: of each family a sheet with the truth first, then one column for each
+technique, a magnified part above and its signed error below (red is too dark, blue too bright), and
+`how-wrong-fails.png`, in which the truth itself has too few rays.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+import rendergraph as rg
+from rendergraph import images
+
+Floats = npt.NDArray[np.float32]
+GAP = 4
+SHADOWS = {
+    "shadow_map": "shadow-map",
+    "shadow_pcf": "shadow-pcf",
+    "shadow_vsm": "shadow-vsm",
+    "shadow_esm": "shadow-esm",
+    "shadow_msm": "shadow-msm",
+    "shadow_convolution": "shadow-convolution",
+    "shadow_pcss": "shadow-pcss",
+    "shadow_cascaded": "shadow-cascaded",
+    "shadow_trapezoidal": "shadow-trapezoidal",
+    "shadow_volumes": "shadow-volumes-auto",
+    "shadow_planar": "shadow-planar",
+}
+BULBS = {"shadow_cube": "shadow-cube", "shadow_cube_map": "shadow-cube-map"}
+OCCLUSION = {
+    "ssao_hemisphere": "ssao-hemisphere",
+    "ssao_disc": "ssao-disc",
+    "hbao": "ssao-hbao",
+    "gtao": "ssao-gtao",
+    "ssao_ssgi": "ssao-ssgi",
+    "ssil": "ssil",
+}
+LIGHT = {
+    "ssgi": "ssgi",
+    "ssgi, back faces": "ssgi-back-faces",
+    "ssgi, guard band": "ssgi-guard-band",
+    "ssgi, hemicube": "ssgi-hemicube",
+    "ssao_ssgi": "ssao-ssgi",
+    "ssil": "ssil",
+}
+
+
+@dataclass(frozen=True)
+class Shots:
+    """A session with one scene and size.
+
+    Attributes:
+        session: where pictures are drawn.
+        scene: a shipped scene.
+        size: width and height in pixels.
+    """
+
+    session: rg.Session
+    scene: str
+    size: tuple[int, int]
+
+    def draw(self, pipeline: str, port: str, *sets: str) -> Floats:
+        """Return what a port holds, shape (height, width, channels): of layers the first, of a guard band what is shown."""
+        loaded = rg.load(pipeline, scene=self.scene, size=self.size, sets=sets)
+        found = np.asarray(self.session.render(loaded, outputs=["radiance"], taps=[port])[port], np.float32)
+        found = found[0] if found.ndim == 4 else found
+        width, height = self.size
+        y, x = (found.shape[0] - height) // 2, (found.shape[1] - width) // 2
+        return found[y : y + height, x : x + width]
+
+    def surfaces(self) -> npt.NDArray[np.bool_]:
+        """Return where the picture shows a surface, shape (height, width)."""
+        return np.asarray(np.abs(self.draw("deferred", "gbuffer.normal")).sum(-1) > 0)
+
+    def lit(self) -> npt.NDArray[np.bool_]:
+        """Return where a light would shine without shadows, shape (height, width): only there visibility counts."""
+        bare = self.draw("deferred", "light.direct_diffuse", "light.visibility=null", "light.blended_lookup=null")
+        return np.asarray(bare[..., :3].sum(-1) > 0.01)
+
+
+def table(title: str, truth: Floats, found: dict[str, Floats], mask: npt.NDArray[np.bool_]) -> None:
+    """Print RMSE, the mean of the signed error, and the part of the pixels that are off by more than 0.1."""
+    print(f"\n{title}; the mean of the truth is {truth[mask].mean():.3f}")
+    for name, one in found.items():
+        off = (one - truth)[mask]
+        rmse, far = np.sqrt((off**2).mean()), (np.abs(off).max(-1) > 0.1).mean()
+        energy = one[mask].mean() / truth[mask].mean()
+        print(f"| `{name}` | {rmse:.4f} | {off.mean():+.4f} | {100 * far:.1f} % | {energy:.2f} |", flush=True)
+
+
+def columns(
+    panels: list[Floats],
+    truth: Floats,
+    mask: npt.NDArray[np.bool_],
+    crop: tuple[int, int, int, int],
+    enlarge: int,
+    gain: float,
+) -> npt.NDArray[np.uint8]:
+    """Return a sheet of parts with their errors beneath them; a part without an error is white."""
+    x, y, width, height = crop
+    part = slice(y, y + height), slice(x, x + width)
+    rows: list[list[Floats]] = [[], []]
+    for panel in panels:
+        off = gain * ((panel - truth).mean(-1) * mask)[part]
+        dark, bright = np.maximum(-off, 0), np.maximum(off, 0)
+        wrong = 1 - np.stack([bright, dark + bright, dark], -1)
+        shown = np.broadcast_to(panel[part], (height, width, 3)) ** np.float32(1 if panel.shape[-1] == 1 else 1 / 2.2)
+        for row, tile in zip(rows, (shown, wrong), strict=True):
+            tile = np.repeat(np.repeat(np.clip(tile, 0, 1), enlarge, 0), enlarge, 1)
+            row.append(np.pad(tile, ((0, GAP), (0, GAP), (0, 0)), constant_values=1))
+    sheet = np.vstack([np.hstack(row) for row in rows])[:-GAP, :-GAP]
+    return np.ascontiguousarray((sheet * 255 + 0.5).astype(np.uint8))
+
+
+def shadows(session: rg.Session, folder: Path | None) -> None:
+    """Measure shadows of a sun and of a point light."""
+    study = Shots(session, "shadow_study", (320, 180))
+    mask, port = study.lit(), "shadows.visibility"
+    hard = study.draw("traced-shadows", port, "shadows.angle=0")
+    soft = study.draw("traced-shadows", port, "shadows.samples=256")
+    found = {name: study.draw(pipeline, port) for name, pipeline in SHADOWS.items()}
+    table("Shadows of a sun without a size", hard, found, mask)
+    table("Shadows of a sun 0.05 rad wide", soft, found, mask)
+    if folder:
+        fine, crop = Shots(session, "shadow_study", (640, 360)), (400, 215, 100, 80)
+        mask, hard = fine.lit(), fine.draw("traced-shadows", port, "shadows.angle=0")
+        names = ("shadow_map", "shadow_pcf", "shadow_vsm", "shadow_esm", "shadow_msm", "shadow_convolution")
+        shown = [hard, *(fine.draw(SHADOWS[name], port) for name in names)]
+        images.write(folder / "how-wrong-shadows.png", columns(shown, hard, mask, crop, 2, 1))
+        soft = fine.draw("traced-shadows", port, "shadows.samples=48")
+        shown = [soft, fine.draw("shadow-pcss", port), shown[2], shown[1]]
+        images.write(folder / "how-wrong-penumbra.png", columns(shown, soft, mask, crop, 3, 1))
+    room = Shots(session, "lantern", (320, 180))
+    traced = room.draw("shadow-cube", port, "shadows.type=traced_shadows")
+    bulbs = {name: room.draw(pipeline, port) for name, pipeline in BULBS.items()}
+    table("Shadows of a point light", traced, bulbs, room.lit())
+
+
+def occlusion(session: rg.Session, folder: Path | None) -> None:
+    """Measure occlusion on a staircase."""
+    stairs = Shots(session, "stairs", (240, 180))
+    mask = stairs.surfaces()
+    exact = stairs.draw("traced-occlusion", "ao.occlusion", "ao.radius=1", "ao.samples=256")
+    found = {}
+    for name, pipeline in OCCLUSION.items():
+        node = "gi" if name in ("ssao_ssgi", "ssil") else "ao"
+        found[name] = stairs.draw(pipeline, f"{node}.occlusion", f"{node}.radius=1", f"{node}.samples=64")
+    table("Occlusion", exact, found, mask)
+    if folder:
+        crop = 70, 70, 60, 60
+        sheet = columns([exact, *found.values()], exact, mask, crop, 2, 4)
+        images.write(folder / "how-wrong-occlusion.png", sheet)
+        rough = stairs.draw("traced-occlusion", "ao.occlusion", "ao.radius=1", "ao.samples=8")
+        parts = [columns([found["gtao"]], truth, mask, crop, 4, 4)[60 * 4 + GAP :] for truth in (exact, rough)]
+        gap = np.full((parts[0].shape[0], GAP, 3), 255, np.uint8)
+        images.write(folder / "how-wrong-fails.png", np.ascontiguousarray(np.hstack([parts[0], gap, parts[1]])))
+
+
+def light(session: rg.Session, folder: Path | None) -> None:
+    """Measure one bounce of light in the Cornell box."""
+    box = Shots(session, "cornell_box", (192, 108))
+    mask, port = box.surfaces(), "gi.indirect"
+    twin = "gi.type=traced_interreflection", "gi.denoise=0", "gi.samples=256"
+    exact = box.draw("ssgi", port, *twin)[..., :3]
+    found = {name: box.draw(pipeline, port, "gi.samples=64")[..., :3] for name, pipeline in LIGHT.items()}
+    table("Light between surfaces", exact, found, mask)
+    if folder:
+        sheet = columns([exact, *found.values()], exact, mask, (62, 40, 64, 60), 2, 4)
+        images.write(folder / "how-wrong-light.png", sheet)
+
+
+FAMILIES = {"shadows": shadows, "occlusion": occlusion, "light": light}
+
+
+def main() -> None:
+    """Print the tables, and draw the pictures where a folder is named."""
+    words = sys.argv[1:]
+    folder = next((Path(word) for word in words if word not in FAMILIES), None)
+    with rg.Session() as session:
+        for name, family in FAMILIES.items():
+            if name in words or not set(FAMILIES) & set(words):
+                family(session, folder)
+
+
+if __name__ == "__main__":
+    main()
