@@ -66,7 +66,7 @@ class Shots:
     size: tuple[int, int]
 
     def draw(self, pipeline: str, port: str, *sets: str) -> Floats:
-        """Return what a port holds, shape (height, width, channels): of layers the first, of a guard band what is shown."""
+        """Return what a port holds, shape (height, width, channels): the first layer, without a guard band."""
         loaded = rg.load(pipeline, scene=self.scene, size=self.size, sets=sets)
         found = np.asarray(self.session.render(loaded, outputs=["radiance"], taps=[port])[port], np.float32)
         found = found[0] if found.ndim == 4 else found
