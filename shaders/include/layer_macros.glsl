@@ -1,5 +1,5 @@
-// Which layers of its material a program lights: CLEARCOAT_LAYER, SHEEN_LAYER, IRIDESCENCE_LAYER, TRANSMISSION_LAYER, and
-// HAS_LAYERS with any of them. It lights those of the batch's material, per fragment of a geometry pass
+// Which layers of its material a program lights: CLEARCOAT_LAYER, SHEEN_LAYER, IRIDESCENCE_LAYER, TRANSMISSION_LAYER,
+// and HAS_LAYERS with any of them. It lights those of the batch's material, per fragment of a geometry pass
 // (FRAGMENT_LAYERS), where the shading model is physical.
 #if defined(DIFFUSE_LOBE) && !defined(NEEDS_PHONG) && !defined(NEEDS_NOTHING)
 #define PHYSICAL_LAYERS
