@@ -8,7 +8,8 @@ import json
 import sys
 from collections.abc import Iterator
 from functools import partial
-from importlib.util import resolve_name
+from importlib.machinery import ModuleSpec
+from importlib.util import find_spec, resolve_name
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,14 +104,24 @@ def _module_digests(name: str, seen: set[str]) -> Iterator[str]:
     package = _BUILTIN if name.startswith(f"{_BUILTIN}.") else name.partition(".")[0]
     waiting = [name]
     while waiting:
-        module = sys.modules.get(waiting.pop())
-        if module is None or not module.__file__ or module.__name__ in seen:
+        spec = _spec(waiting.pop())
+        if spec is None or not spec.origin or spec.name in seen:
             continue
-        seen.add(module.__name__)
-        file = Path(module.__file__)
+        seen.add(spec.name)
+        file = Path(spec.origin)
         yield file_digest(file)
-        imports = _IMPORTS.get(file, partial(_imported_names, file, module.__package__ or ""))
+        imports = _IMPORTS.get(file, partial(_imported_names, file, spec.parent or ""))
         waiting += [other for other in imports if other == package or other.startswith(f"{package}.")]
+
+
+def _spec(name: str) -> ModuleSpec | None:
+    """Return where a module comes from, whether or not it has been imported: another process may have done so."""
+    if (module := sys.modules.get(name)) is not None:
+        return module.__spec__
+    try:
+        return find_spec(name)
+    except (ImportError, AttributeError, ValueError):  # the name is that of something within a module
+        return None
 
 
 def _imported_names(file: Path, package: str) -> list[str]:

@@ -62,7 +62,7 @@ float power_heuristic(float density, float other) {
     return 1.0 / (1.0 + ratio * ratio);
 }
 
-vec3 reflected(Surface s, vec3 light_dir) {
+vec3 reflected_part(Surface s, vec3 light_dir) {
     ReflectedLight found = shade(s, light_dir);
 #if TERMS == TERMS_DIFFUSE
     return found.diffuse;

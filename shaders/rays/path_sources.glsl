@@ -77,7 +77,7 @@ SourceSample sample_source(
     if (choice < chances.x) {
 #ifdef USES_LIGHTS
         vec3 irradiance = irradiance_from(lights[light], s.position, found.direction);
-        found.reflected = reflected(s, found.direction) * irradiance / (chances.x * light_chance);
+        found.reflected = reflected_part(s, found.direction) * irradiance / (chances.x * light_chance);
         if (lights[light].position.w > 0.0) {
             found.direction = lights[light].position.xyz - origin;
             found.reach = 1.0;
@@ -93,7 +93,7 @@ SourceSample sample_source(
         float chosen = chances.y * environment_density(found.direction);
         float weight = power_heuristic(chosen, direction_density(s, found.direction));
         vec3 radiance = light_from(found.direction, -1e-6) * (SPREAD_LIGHT * weight / max(chosen, 1e-37));
-        if (chosen > 0.0) found.reflected = reflected(s, found.direction) * radiance;
+        if (chosen > 0.0) found.reflected = reflected_part(s, found.direction) * radiance;
 #endif
     } else if (chances.z > 0.0) {
 #ifdef USES_EMITTERS
@@ -116,7 +116,7 @@ SourceSample sample_source(
         float chosen = chances.z * chance / max(area, 1e-37) * square / max(facing, 1e-9);
         float weight = power_heuristic(chosen, direction_density(s, to_emitter));
         if (facing > 0.0 && square > 0.0) {
-            found.reflected = emission(emitter.instance, emitter.triangle, barycentrics) * reflected(s, to_emitter)
+            found.reflected = emission(emitter.instance, emitter.triangle, barycentrics) * reflected_part(s, to_emitter)
                 * (SPREAD_LIGHT * weight * opacity(emitter.instance, emitter.triangle, barycentrics)
                     / max(chosen, 1e-37));
         }

@@ -119,7 +119,7 @@ void main() {
                     direction = sample_direction(s, vec3(sobol_point(point, dimension + 0x500000u), survival.x));
                     density = direction_density(s, direction);
                     bool goes_on = dot(direction, s.geometric_normal) > 0.0 && density > 0.0;
-                    throughput *= reflected(s, direction) * (SPREAD_LIGHT / max(density, 1e-37));
+                    throughput *= reflected_part(s, direction) * (SPREAD_LIGHT / max(density, 1e-37));
                     float strongest = max(max(throughput.x, throughput.y), throughput.z);
                     if (vertex >= 3) {  // Russian roulette
                         float survives = min(strongest, 0.95);

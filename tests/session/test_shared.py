@@ -14,9 +14,10 @@ def test_calls_of_a_thread_share_a_context_and_threads_have_their_own() -> None:
     pipeline = rg.load("shading-unlit", size=(8, 8))
     first = pipeline.render()["image"]
     here = gpu.shared(None)
+    made = here.cache.scenes_made
     again = pipeline.set("display.exposure", 0).render()["image"]
     assert gpu.shared(None) is here
-    assert here.cache.scenes_made == 1, "the second call found the scene on the GPU"
+    assert here.cache.scenes_made == made, "the second call found the scene on the GPU"
     seen: list[object] = []
 
     def work() -> None:
