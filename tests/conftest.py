@@ -50,9 +50,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     `nightly(keep=2)` on a parametrised test leaves two of its cases in `make check`, spread over all of them.
     """
     for item in items:
-        shares_page = {"browser", "served"} & set(getattr(item, "fixturenames", ()))
-        if shares_page or item.path.stem not in SPREAD:
-            item.add_marker(pytest.mark.xdist_group("page" if shares_page else item.path.stem))
+        fixtures = set(getattr(item, "fixturenames", ()))
+        shared = "page" if fixtures & {"browser", "served"} else "generated" if "generated" in fixtures else ""
+        if shared or item.path.stem not in SPREAD:
+            item.add_marker(pytest.mark.xdist_group(shared or item.path.stem))
     cases: dict[str, list[pytest.Item]] = {}
     for item in items:
         cases.setdefault(item.nodeid.partition("[")[0], []).append(item)

@@ -438,6 +438,7 @@ def test_relative_errors_are_those_of_numpy_in_float64() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("executor", ["serial", "processes:2"])
 def test_traced_occlusion_explains_the_error_of_the_screen_s(
     gl: rg.Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, executor: str

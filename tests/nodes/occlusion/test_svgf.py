@@ -79,7 +79,7 @@ def test_the_filter_takes_noise(short: Sequence[dict[str, Floats]], truth: Float
     assert first["smooth"].mean() == pytest.approx(truth.mean(), rel=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_still_picture_converges_to_the_mean_of_its_samples(still: Sequence[dict[str, Floats]]) -> None:
     away = [error(frame["smooth"], frame["raw"]) for frame in (still[3], still[15], still[63])]
     assert away[1] < 0.7 * away[0]
@@ -93,7 +93,7 @@ def test_the_mean_is_that_of_the_samples_without_the_filter(session: rg.Session,
     np.testing.assert_allclose(last["smooth"], last["raw"], rtol=0.03, atol=2e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_variance_falls_with_the_number_of_frames(still: Sequence[dict[str, Floats]], truth: Floats) -> None:
     """It is that of the mean: a quarter after four times as many frames, and what the errors are on average."""
     early, late = (still[number]["variance"][..., 0].mean() for number in (15, 63))
