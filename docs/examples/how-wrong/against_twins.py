@@ -1,4 +1,4 @@
-"""Hold every technique against its traced twin: `python measure.py [FOLDER] [shadows] [occlusion] [light]`.
+"""Hold every technique against its traced twin: `python against_twins.py [FOLDER] [shadows] [occlusion] [light]`.
 
 Tables go to stdout. A folder gets four pictures: of each family a sheet with the truth first, then one column for each
 technique, a magnified part above and its signed error below (red is too dark, blue too bright), and
