@@ -232,9 +232,9 @@ def editor() -> Iterator[Editor]:
 def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the schema of the standard nodes, and one with plugins: a Python file and a shader."""
     folder = tmp_path_factory.mktemp("desk")
-    (folder / "fog.py").write_text(PLUGIN, encoding="utf-8")
+    (folder / "even_fog.py").write_text(PLUGIN, encoding="utf-8")
     (folder / "dim.frag").write_text(SHADER, encoding="utf-8")
-    plugins = ["--plugin", str(folder / "fog.py"), "--plugin", str(folder / "dim.frag")]
+    plugins = ["--plugin", str(folder / "even_fog.py"), "--plugin", str(folder / "dim.frag")]
     assert main(["schema", "-o", str(folder / "rendergraph.schema.json")]) == 0
     assert main(["schema", "-o", str(folder / "plugins.schema.json"), *plugins]) == 0
     assert main(["schema", "scene", "-o", str(folder / "scene.schema.json")]) == 0
@@ -444,7 +444,7 @@ def test_hovering_shows_the_docs(editor: Editor, desk: Path, at: str, shown: str
 
 
 def test_nodes_of_a_plugin_are_known_like_the_others(editor: Editor, desk: Path) -> None:
-    fog = "  fog: {type: fog, inputs: {radiance: light.radiance, depth: light.surface_depth}, params: {density: 0.1}}\n"
+    fog = "  fog: {type: even_fog, inputs: {radiance: light.radiance, depth: light.surface_depth}, params: {density: 0.1}}\n"
     without = PIPELINE.replace("  display:", fog + "  display:")
     assert [line for line, _ in editor.marks(desk, without)] == [line_of("  display:")]
     text = without.replace("rendergraph.schema", "plugins.schema")
