@@ -155,7 +155,7 @@ def surfaces(gl: rg.Session, plugins: Path, scene: str | Path, size: tuple[int, 
 def differences(frame: rg.Frame) -> dict[str, npt.NDArray[np.float32]]:
     """How far each texture is from what is drawn, at every pixel that a triangle covers; relative where it is bright."""
     covered = frame["seen"][..., 0] >= 0
-    assert 0.05 < covered.mean() <= 1
+    assert 0.01 < covered.mean() <= 1  # a camera that frames a whole clip sees little of a character
     found = {name: np.abs(frame[name] - frame[f"drawn_{name}"])[covered] for name in OF_GBUFFER}
     found["emissive"] /= np.maximum(1.0, frame["drawn_emissive"][covered])
     found["grain"] = found["grain"][frame["drawn_grain"][covered][:, 3] > 0]  # of anisotropic materials

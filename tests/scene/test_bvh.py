@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -160,11 +158,3 @@ def test_the_cost_grows_with_the_logarithm_of_the_number() -> None:
     steps = np.diff(costs)  # a fourfold number each
     assert steps.max() < 1.5 * steps.min()
     assert costs[-1] < 50
-
-
-@pytest.mark.nightly
-def test_a_million_triangles_take_at_most_four_seconds() -> None:
-    mesh = sphere(707)
-    started = time.process_time()
-    build(triangle_boxes(*mesh), [len(mesh[1])])
-    assert time.process_time() - started < 4
