@@ -39,7 +39,9 @@ def scene_of(resolved: Resolved) -> Scene:
         if spec.scene is not None:
             scene = load(spec.scene, check_path=spec.roots.check, limits=limits, extensions=extensions)
         bare = selection.environment == Path("none")
-        if selection.environment is not None and not bare:
+        if bare:
+            scene = replace(scene, environment=None)
+        elif selection.environment is not None:
             scene = replace(scene, environment=_environment(selection.environment, scene, limits, extensions))
         scene = _measured(scene, limits)
     framed = () if scene.cameras else (shape,)

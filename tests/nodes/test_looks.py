@@ -23,6 +23,11 @@ def test_environment_none_leaves_the_background_black(tmp_path: Path, session: r
     assert bare[..., :3].max() > 20, "the key light stays"
 
 
+def test_environment_none_takes_away_that_of_a_scene_file() -> None:
+    assert rg.load("full").link().scene.environment is not None
+    assert rg.load("full", environment="none").link().scene.environment is None
+
+
 ASSETS = (
     *("BoxTextured.glb", "BoxVertexColors.glb", "DamagedHelmet.glb", "Fox.glb", "WaterBottle/WaterBottle.gltf"),
     *("Suzanne/Suzanne.gltf", "SheenCloth/SheenCloth.gltf", "RiggedFigure.glb", "MorphStressTest.glb"),
