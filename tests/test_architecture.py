@@ -119,3 +119,13 @@ def test_a_problem_is_relocated_and_never_edited_on_its_way_up() -> None:
     files = [file for file in (ROOT / "rendergraph").rglob("*.py") if file.parent.name != "errors"]
     edited = {str(file): problems_edited(file.read_text()) for file in files}
     assert {file: lines for file, lines in edited.items() if lines} == {}
+
+
+def test_mitsuba_is_imported_by_its_own_programs_alone() -> None:
+    """It and a software rasteriser do not get on in one process. Of `rendergraph/` import-linter says the same."""
+    importers = set()
+    for file in (ROOT / "pipelines").rglob("*.py"):
+        for statement in ast.walk(ast.parse(file.read_text())):
+            if isinstance(statement, ast.Import) and {name.name for name in statement.names} & {"mitsuba", "drjit"}:
+                importers.add(file.relative_to(ROOT / "pipelines" / "references" / "mitsuba").stem)
+    assert importers == {"lights", "render", "surfaces"}

@@ -263,14 +263,14 @@ def _of_with(problem: Problem, settings: Sequence[str]) -> Problem:
 
 def load_reference(reference: str | None, select: options.Select) -> Path | Pipeline | None:
     """Return the reference: a picture's path, or a pipeline with the same scene, without the variants' settings."""
-    from rendergraph.mitsuba import mitsuba_or_other
+    from rendergraph.pipelines.references import renderer_or_other
     from rendergraph.session.picture_metadata import is_picture
 
     if reference is None:
         return None
     if is_picture(reference):
         return Path(reference)
-    return options.linked(mitsuba_or_other(replace(select(reference), sets=(), patches=())))
+    return options.linked(renderer_or_other(replace(select(reference), sets=(), patches=())))
 
 
 def check_page(output: Path) -> None:

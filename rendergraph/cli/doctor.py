@@ -37,7 +37,7 @@ def command(as_json: bool) -> None:
 
 
 def examine() -> dict[str, Any]:
-    from rendergraph import mitsuba
+    from rendergraph.pipelines import references
 
     found = _probe()
     devices = [device | _probe(str(device["number"])) for device in found.get("devices", [])]
@@ -54,7 +54,7 @@ def examine() -> dict[str, Any]:
         "libraries": found.get("libraries", {}),
         "problem": found.get("problem"),
         "devices": devices,
-        "mitsuba": mitsuba.examine(),
+        **references.examine(),
         "install": _advice(found, devices, packages),
     }
 
@@ -113,6 +113,8 @@ def _advice(found: dict[str, Any], devices: list[dict[str, Any]], packages: dict
 
 
 def _text(report: dict[str, Any]) -> str:
+    from rendergraph.pipelines import references
+
     lines = [f"rendergraph {report['rendergraph']}, Python {report['python']}, {report['platform']}"]
     lines.append(", ".join(f"{name} {version or 'MISSING'}" for name, version in report["packages"].items()))
     lines += [f"{name}: {problem}" for name, problem in report["libraries"].items() if problem]
@@ -131,13 +133,7 @@ def _text(report: dict[str, Any]) -> str:
         words += [device[key] for key in ("render_node", "drm") if device.get(key)][:1]
         rows.append((device["number"], "yes", device["renderer"], ", ".join(words)))
     lines.append(table(rows, ("device", "usable", "renderer", "properties")) if rows else "no GL devices")
-    lines += ["", _mitsuba_line(report["mitsuba"]), ""]
+    lines += ["", *references.summary(report), ""]
     lines.append("ready to render" if report["ok"] else "cannot render here yet")
     lines += [f"  {line}" for line in report["install"]]
     return "\n".join(lines)
-
-
-def _mitsuba_line(found: dict[str, Any]) -> str:
-    if found["install"]:
-        return f"--reference mitsuba needs: {', '.join(found['install'])}"
-    return f"--reference mitsuba: Mitsuba {found['mitsuba']}, LLVM {found['llvm']}"

@@ -22,7 +22,7 @@ from rendergraph.compare.space import Axes, Space, pipelines, run_name, unique_n
 from rendergraph.errors import InputError, Option, Place, Problem, UsageError
 from rendergraph.farm.bundle import relocate_selection
 from rendergraph.metrics import Encoding, check_sizes
-from rendergraph.mitsuba import mitsuba_or_other
+from rendergraph.pipelines.references import renderer_or_other
 from rendergraph.session import stages
 from rendergraph.session.picture_metadata import frame_metadata, is_picture, pipeline_metadata
 from rendergraph.session.pipeline import Pipeline
@@ -437,7 +437,7 @@ def named_reference(reference: Path | Pipeline | str | None) -> Path | Pipeline 
     """Return a reference; a name becomes a picture's path or a pipeline."""
     if not isinstance(reference, str):
         return reference
-    return Path(reference) if is_picture(reference) else Pipeline(mitsuba_or_other(Selection(reference)))
+    return Path(reference) if is_picture(reference) else Pipeline(renderer_or_other(Selection(reference)))
 
 
 def read_picture(path: Path, size: tuple[int, int] | None = None, name: str = "") -> tuple[Pixels, Encoding]:

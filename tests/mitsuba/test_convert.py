@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from rendergraph.pipelines.references.mitsuba.convert import camera_values, scene_values
 
-from rendergraph.mitsuba.convert import camera_values, scene_values
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.load import load
 from rendergraph.scene.model import Camera, Scene

@@ -7,10 +7,10 @@ import sys
 from types import SimpleNamespace
 
 import pytest
+from rendergraph.pipelines.references.mitsuba import installation
 
 from rendergraph.compare import compare
 from rendergraph.errors import UsageError
-from rendergraph.mitsuba import installation
 
 LISTED = """1000 libs found in cache `/etc/ld.so.cache'
 \tlibLLVM.so.19.1 (libc6,x86-64) => /lib/x86_64-linux-gnu/libLLVM.so.19.1

@@ -6,9 +6,9 @@ from typing import Any, Literal
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from rendergraph.pipelines.references.mitsuba.process import Tracer
 
 from rendergraph.api import Facts, Frame, Internal, Luminance, Node, Output, Radiance, Steps, param, structural
-from rendergraph.mitsuba import Tracer
 
 
 def _bytes(node: Any, facts: Facts) -> int:

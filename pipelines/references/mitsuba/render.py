@@ -1,4 +1,4 @@
-"""Trace a scene with Mitsuba: `python -m rendergraph.mitsuba.render FOLDER`, which `process.Tracer` starts.
+"""Trace a scene with Mitsuba: `python -m` this module and a folder, which `process.Tracer` starts.
 
 The folder holds `request.json` and `arrays.npz`. Each line of standard input is a number of samples; when a pixel has
 that many in all, the result is written to `result.npz`, and an empty line is printed.
@@ -17,8 +17,8 @@ import mitsuba as mi
 import numpy as np
 
 mi.set_variant("llvm_ad_rgb")
-from rendergraph.mitsuba.lights import Emission, Punctual, environment  # noqa: E402  they need the variant
-from rendergraph.mitsuba.surfaces import Surface, Tables  # noqa: E402
+from rendergraph.pipelines.references.mitsuba.lights import Emission, Punctual, environment  # noqa: E402  they need the variant
+from rendergraph.pipelines.references.mitsuba.surfaces import Surface, Tables  # noqa: E402
 
 _PASS_RAYS = 1 << 21
 """Camera rays that are traced at once; each takes about 200 bytes."""

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
+from rendergraph.pipelines.references.mitsuba.convert import camera_values, scene_values
+from rendergraph.pipelines.references.mitsuba.installation import require
 
 from rendergraph.errors import Problem, RenderError
 from rendergraph.images import decode, decode_light, from_srgb
-from rendergraph.mitsuba.convert import camera_values, scene_values
-from rendergraph.mitsuba.installation import required_llvm
 from rendergraph.scene.model import ImageSource, MadeImage, Scene, SceneLimits
 from rendergraph.steps import ViewMatrices
 
@@ -66,7 +66,7 @@ class Tracer:
         jitter: bool = True,
         limits: SceneLimits = SceneLimits(),
     ) -> None:
-        llvm = required_llvm()
+        llvm = require()
 
         def texels(image: ImageSource | MadeImage, srgb: bool) -> npt.NDArray[np.float16]:
             if scene.environment is not None and image is scene.environment.image:
@@ -84,7 +84,7 @@ class Tracer:
         np.savez(self._folder / "arrays.npz", allow_pickle=False, **arrays)
         with open(self._folder / "errors", "w") as errors:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "rendergraph.mitsuba.render", folder.name],
+                [sys.executable, "-m", "rendergraph.pipelines.references.mitsuba.render", folder.name],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=errors,

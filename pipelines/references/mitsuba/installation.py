@@ -9,7 +9,8 @@ import subprocess
 from typing import Any
 
 from rendergraph.errors import Problem, UsageError
-from rendergraph.installed import require, version
+from rendergraph.installed import require as require_extra
+from rendergraph.installed import version
 
 _VARIABLE = "DRJIT_LIBLLVM_PATH"
 _LEAST = 17
@@ -17,13 +18,13 @@ _LEAST = 17
 _LIBRARY = re.compile(r"^\s*libLLVM(?:-(\d+)\.so|\.so\.(\d+))\S* .*=> (\S+)$", re.MULTILINE)
 
 
-def required_llvm() -> dict[str, str]:
+def require() -> dict[str, str]:
     """Return the variable that tells Mitsuba which LLVM to use.
 
     Raises:
         UsageError: Mitsuba or a usable LLVM is not installed.
     """
-    require("Mitsuba as reference", "mitsuba", "mitsuba")
+    require_extra("Mitsuba as reference", "mitsuba", "mitsuba")
     _, path = find_llvm()
     if path:
         return {_VARIABLE: path}
@@ -54,3 +55,10 @@ def examine() -> dict[str, Any]:
         "llvm": llvm or None,
         "install": install + ([] if llvm else ["apt install libllvm19"]),
     }
+
+
+def summary(found: dict[str, Any]) -> str:
+    """Return in a line what `examine` found."""
+    if found["install"]:
+        return f"--reference mitsuba needs: {', '.join(found['install'])}"
+    return f"--reference mitsuba: Mitsuba {found['mitsuba']}, LLVM {found['llvm']}"
