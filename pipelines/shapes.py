@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
+from rendergraph.pipelines.polygons import clip_ears
 
 from rendergraph.keys import Key
 from rendergraph.keys.values import number, vector, whole
 from rendergraph.projection import unit
-from rendergraph.scene.geometry import clip_ears, translation
+from rendergraph.scene.geometry import translation
 from rendergraph.scene.model import Matrix, Mesh
 
 Doubles = npt.NDArray[np.float64]

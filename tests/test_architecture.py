@@ -11,6 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 NODES = sorted((ROOT / "nodes").rglob("*.py"))
+FRAMEWORK = sorted(file for folder in ("rendergraph", "pipelines") for file in (ROOT / folder).rglob("*.py"))
 
 
 @pytest.mark.parametrize("file", NODES, ids=lambda file: file.stem)
@@ -90,7 +91,7 @@ def test_no_code_reads_a_message() -> None:
     """Whoever wants to know what a mistake is about asks its subject, its kind, its place or its code."""
     assert messages_read('if "x" in problem.text: pass\nre.match("a", mistake.text)\nstr(problem).split()') == [1, 2, 3]
     assert messages_read('error.place.file.startswith("--set ")\nplace.file == "patch"') == [1]
-    files = {str(file): messages_read(file.read_text()) for file in (ROOT / "rendergraph").rglob("*.py")}
+    files = {str(file): messages_read(file.read_text()) for file in FRAMEWORK}
     assert {file: lines for file, lines in files.items() if lines} == {}
 
 
@@ -116,7 +117,7 @@ def problems_edited(source: str) -> list[int]:
 def test_a_problem_is_relocated_and_never_edited_on_its_way_up() -> None:
     """`Problem.relocate` gives it another place, a context and a hint."""
     assert problems_edited('f"in x: {problem.text}"\nproblem.message + "; or"\nreplace(problem, place=p)') == [1, 2, 3]
-    files = [file for file in (ROOT / "rendergraph").rglob("*.py") if file.parent.name != "errors"]
+    files = [file for file in FRAMEWORK if file.parent.name != "errors"]
     edited = {str(file): problems_edited(file.read_text()) for file in files}
     assert {file: lines for file, lines in edited.items() if lines} == {}
 

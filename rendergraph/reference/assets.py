@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from rendergraph.pipelines.formats import MESHES, used_extensions
 from rendergraph.reference.node_types import summary
 from rendergraph.resources import opening, shipped_pipelines, shipped_scenes
 
@@ -13,7 +14,6 @@ if TYPE_CHECKING:
     from rendergraph.scene.model import Camera, Light, Material, Scene
     from rendergraph.session.values import Linked
 
-_MESHES = (".obj", ".gltf", ".glb")
 _YAML = (".yaml", ".yml")
 
 
@@ -22,7 +22,7 @@ def kind_of(topic: str) -> Literal["pipeline", "scene"] | None:
     if topic in shipped_pipelines():
         return "pipeline"
     path = Path(topic)
-    if topic in shipped_scenes() or path.suffix.lower() in _MESHES:
+    if topic in shipped_scenes() or path.suffix.lower() in MESHES:
         return "scene"
     if path.suffix.lower() not in _YAML or not path.is_file():
         return None
@@ -54,7 +54,6 @@ def describe_pipeline(name: str, linked: Linked) -> dict[str, Any]:
 
 def describe_scene(name: str, path: Path, scene: Scene) -> dict[str, Any]:
     from rendergraph.scene.animate import complete, moves  # other topics need no scene
-    from rendergraph.scene.gltf import used_extensions  # likewise
 
     triangles = [mesh.indices.size // 3 for mesh in scene.meshes]
     added = [] if scene.cameras else ["It has no camera: one is added in front, above and to the right."]
@@ -79,7 +78,7 @@ def describe_scene(name: str, path: Path, scene: Scene) -> dict[str, Any]:
             {"name": clip.name, "seconds": round(clip.length, 3)} for rig in scene.rigs for clip in rig.clips.values()
         ],
         "materials": [{"name": one.name, "line": _material(one)} for one in scene.materials],
-        "extensions": used_extensions(path) if path.suffix.lower() in (".gltf", ".glb") else [],
+        "extensions": used_extensions(path),
         "lights": [{"name": light.name, "line": _light(light)} for light in scene.lights],
         "cameras": [{"name": name, "line": _camera(camera)} for name, camera in scene.cameras.items()],
         "added": added,

@@ -1,4 +1,4 @@
-"""Meshes from files: OBJ, glTF, and the formats of plugins."""
+"""Meshes from files: in shipped formats, and in those of plugins."""
 
 from __future__ import annotations
 
@@ -12,25 +12,20 @@ from rendergraph.declare import Added, MeshData
 from rendergraph.declare.extensions import MeshLoader
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem, shown_file
+from rendergraph.pipelines.formats import MESHES as MESHES
+from rendergraph.pipelines.formats import read
 from rendergraph.scene.geometry import face_normals, filled_normals
 from rendergraph.scene.model import FARTHEST, Floats, Material, Mesh, Object, Scene
 from rendergraph.scene.reading import Reading, UniqueNames
 
-MESHES = (".obj", ".gltf", ".glb")
 _WIDTHS = {"positions": (3,), "normals": (3,), "uv0": (2,), "uv1": (2,), "colors": (3, 4)}
 
 
 def read_mesh(path: Path, reading: Reading, unknown: Problem, known: tuple[str, ...] = MESHES) -> Scene:
     """Read the scene in a mesh file; `unknown` is the mistake if it has none of the `known` or plugins' extensions."""
     extension = path.suffix.lower()
-    if extension == ".obj":
-        from rendergraph.scene.obj import read_obj  # each reader comes with its first file
-
-        return read_obj(path, reading)
-    if extension in (".gltf", ".glb"):
-        from rendergraph.scene.gltf import read_gltf  # each reader comes with its first file
-
-        return read_gltf(path, reading)
+    if extension in MESHES:
+        return read(path, reading)
     loader = reading.extensions.mesh_loader(extension)
     if loader is None:
         names = [*known, *(added.name for added in reading.extensions.meshes())]

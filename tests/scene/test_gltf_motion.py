@@ -217,7 +217,8 @@ def check(gl: Any, path: Path, moments: npt.ArrayLike, clip: int = 0) -> None:
     """Compare what the GPU holds with the reference, at some times: all streams, the scene's data, boxes, the past."""
     reference, scene = Reference(path), load(path)
     if clip:
-        from rendergraph.scene.gltf import read_gltf
+        from rendergraph.pipelines.formats.gltf import read_gltf
+
         from rendergraph.scene.reading import Reading, inside
 
         read = read_gltf(path, Reading(path, inside(path.parent)))

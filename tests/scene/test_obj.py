@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rendergraph.pipelines.formats.obj.parser import parse
+from rendergraph.pipelines.polygons import clip_ears, triangulate
 
 import rendergraph as rg
 from rendergraph.errors import InputError, Problem
-from rendergraph.scene.geometry import clip_ears, triangulate
 from rendergraph.scene.load import load
 from rendergraph.scene.model import Scene
-from rendergraph.scene.obj.parser import parse
 from rendergraph.scene.reading import Reading, inside
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"

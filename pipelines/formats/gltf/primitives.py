@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 from msgspec.structs import replace
+from rendergraph.pipelines.formats.gltf.buffers import Buffers
+from rendergraph.pipelines.formats.gltf.schema import Accessor, Primitive
 
 from rendergraph.errors import InputError
 from rendergraph.projection import unit
 from rendergraph.scene.geometry import Indices, fan_triangles, filled_normals, flat, strip_triangles
-from rendergraph.scene.gltf.buffers import Buffers
-from rendergraph.scene.gltf.schema import Accessor, Primitive
 from rendergraph.scene.model import FARTHEST, Floats, Mesh, extremes
 from rendergraph.scene.reading import Reading, UniqueNames
 from rendergraph.scene.rig import Deform

@@ -13,17 +13,17 @@ from pathlib import Path
 import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
+from rendergraph.pipelines.formats.gltf import schema
+from rendergraph.pipelines.formats.gltf.buffers import Buffers, split_glb
+from rendergraph.pipelines.formats.gltf.materials import Materials
+from rendergraph.pipelines.formats.gltf.motion import read_clips, read_skins
+from rendergraph.pipelines.formats.gltf.primitives import Primitives
+from rendergraph.pipelines.formats.gltf.schema import Gltf, check_index
 
 from rendergraph.document import shown
 from rendergraph.errors import InputError
 from rendergraph.projection import unit
 from rendergraph.scene.geometry import rigid, vec3
-from rendergraph.scene.gltf import schema
-from rendergraph.scene.gltf.buffers import Buffers, split_glb
-from rendergraph.scene.gltf.materials import Materials
-from rendergraph.scene.gltf.motion import read_clips, read_skins
-from rendergraph.scene.gltf.primitives import Primitives
-from rendergraph.scene.gltf.schema import Gltf, check_index
 from rendergraph.scene.model import FARTHEST, Camera, Light, Matrix, Object, Placement, Scene
 from rendergraph.scene.reading import Reading, UniqueNames
 from rendergraph.scene.rig import Part, Rig, placements

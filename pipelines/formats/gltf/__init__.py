@@ -4,6 +4,6 @@ Everything in a file is checked, whether its scene uses it or not: `schema` has 
 arrays, `materials`, `primitives` and `motion` the parts of a scene, `reader` its nodes.
 """
 
-from rendergraph.scene.gltf.reader import read_gltf, used_extensions
+from rendergraph.pipelines.formats.gltf.reader import read_gltf, used_extensions
 
 __all__ = ["read_gltf", "used_extensions"]

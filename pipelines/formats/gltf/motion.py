@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from rendergraph.pipelines.formats.gltf.buffers import Buffers
+from rendergraph.pipelines.formats.gltf.schema import Animation, Gltf, check_index
 
 from rendergraph.projection import unit
-from rendergraph.scene.gltf.buffers import Buffers
-from rendergraph.scene.gltf.schema import Animation, Gltf, check_index
 from rendergraph.scene.reading import Reading, UniqueNames
 from rendergraph.scene.rig import Clip, Skin, Track
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from msgspec.structs import asdict, replace
+from rendergraph.pipelines.formats.gltf import schema
+from rendergraph.pipelines.formats.gltf.buffers import Buffers, uri_bytes
+from rendergraph.pipelines.formats.gltf.schema import Gltf, TextureInfo, check_index
 
-from rendergraph.scene.gltf import schema
-from rendergraph.scene.gltf.buffers import Buffers, uri_bytes
-from rendergraph.scene.gltf.schema import Gltf, TextureInfo, check_index
 from rendergraph.scene.model import ImageSource, Material, Texture, Vec3
 from rendergraph.scene.reading import Reading, UniqueNames
 

@@ -11,9 +11,9 @@ from urllib.parse import unquote, unquote_to_bytes
 
 import numpy as np
 import numpy.typing as npt
+from rendergraph.pipelines.formats.gltf.schema import Accessor, Buffer, BufferView, Gltf, Sparse, check_index
 
 from rendergraph.errors import InputError
-from rendergraph.scene.gltf.schema import Accessor, Buffer, BufferView, Gltf, Sparse, check_index
 from rendergraph.scene.reading import Reading
 
 _COMPONENTS: dict[int, np.dtype[np.generic]] = {

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 from msgspec import Struct, field
+from rendergraph.pipelines.formats.obj.parser import text_of
 
 from rendergraph.document import shown
 from rendergraph.errors import InputError
 from rendergraph.scene.model import Material, Texture, Vec3
-from rendergraph.scene.obj.parser import text_of
 from rendergraph.scene.phong import dielectric_f0, roughness_of
 from rendergraph.scene.reading import Reading, printable
 

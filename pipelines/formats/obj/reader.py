@@ -12,13 +12,14 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
+from rendergraph.pipelines.formats.obj.mtl import read_mtl
+from rendergraph.pipelines.formats.obj.parser import ABSENT, Ints, Statements, parse
+from rendergraph.pipelines.polygons import MOST_CORNERS, newell, triangulate
 
 from rendergraph.document import shown
 from rendergraph.projection import unit
-from rendergraph.scene.geometry import MOST_CORNERS, Doubles, face_normals, mean_normals, newell, triangulate
+from rendergraph.scene.geometry import Doubles, face_normals, mean_normals
 from rendergraph.scene.model import Floats, Material, Mesh, Object, Scene
-from rendergraph.scene.obj.mtl import read_mtl
-from rendergraph.scene.obj.parser import ABSENT, Ints, Statements, parse
 from rendergraph.scene.reading import Reading, UniqueNames, printable
 
 _DEFAULT = "default"
