@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
+from msgspec.structs import replace
 from rendergraph.pipelines.polygons import clip_ears
 
 from rendergraph.keys import Key
-from rendergraph.keys.values import number, vector, whole
+from rendergraph.keys.values import choice, number, vector, whole
 from rendergraph.projection import unit
 from rendergraph.scene.geometry import translation
 from rendergraph.scene.model import Matrix, Mesh
@@ -51,13 +52,53 @@ class Shape(Struct, frozen=True):
 def build(shape: str, **values: Any) -> list[ShapePart]:
     """Build the parts of a shape; parameters that are not given have their defaults."""
     kind = SHAPES[shape]
-    parts = kind.make(**{key.name: key.default for key in kind.keys} | values)
-    return parts if isinstance(parts, list) else [ShapePart(parts, np.eye(4))]
+    given = {key.name: key.default for key in kind.keys} | values
+    in_metres = given.pop("uv") == "metres"
+    parts = kind.make(**given)
+    parts = parts if isinstance(parts, list) else [ShapePart(parts, np.eye(4))]
+    return [replace(part, mesh=_in_metres(part.mesh)) for part in parts] if in_metres else parts
 
 
 def mesh(shape: str, **values: Any) -> Mesh:
     """The mesh of a shape of one part."""
     return build(shape, **values)[0].mesh
+
+
+def _in_metres(found: Mesh) -> Mesh:
+    """A mesh whose texture coordinates are lengths on its surface, on average over each smooth side of it.
+
+    Around a closed side they are rounded to whole metres, so that a texture whose tile divides a metre has no seam.
+    """
+    assert found.uv0 is not None  # shapes have them
+    side = np.arange(len(found.positions))  # the least vertex of the same side
+    while True:
+        least = side[found.indices].min(axis=1)
+        before = side.copy()
+        np.minimum.at(side, found.indices, least[:, None])
+        side = side[side]
+        if (side == before).all():
+            break
+    uv = found.uv0.astype(np.float64)
+    for first in np.unique(side):
+        mine = side == first
+        corners = found.indices[mine[found.indices[:, 0]]]
+        edges = found.positions[corners[:, 1:]].astype(np.float64) - found.positions[corners[:, :1]]
+        steps = uv[corners[:, 1:]] - uv[corners[:, :1]]
+        area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+        inverse = np.linalg.pinv(steps)  # (n, 2, 2): edges = steps @ derivatives
+        lengths = np.linalg.norm(inverse @ edges, axis=-1)  # along u and along v
+        for axis in (0, 1):
+            length = float((area * lengths[:, axis]).sum() / max(area.sum(), 1e-30))
+            low, high = (found.positions[mine & (found.uv0[:, axis] == end)] for end in _ends(found.uv0[mine, axis]))
+            if len(low) == len(high) > 1 and (np.ptp(low, axis=0) > 0).any() and (low == high).all():
+                around = length * float(np.ptp(found.uv0[mine, axis]))
+                length *= max(1.0, round(around)) / around
+            uv[mine, axis] *= length
+    return replace(found, uv0=uv.astype(np.float32))
+
+
+def _ends(values: npt.NDArray[Any]) -> tuple[Any, Any]:
+    return values.min(), values.max()
 
 
 def _mesh(
@@ -281,7 +322,8 @@ _SIZE = Key("size", vector(3, 0, above=True), "Extent along X, Y and Z.", (1.0, 
 _SIDES = Key("sides", whole(3, 1024), "Sides around the tube.", 24)
 _RINGS = Key("rings", whole(2, 1024), "Rows from pole to pole.", 24)
 _SEGMENTS = Key("segments", whole(3, 2048), "Sides around the axis.", 48)
-SHAPES: dict[str, Shape] = {
+_UV = Key("uv", choice("unit", "metres"), "Texture coordinates: 0 to 1 across each side, or lengths on it.", "unit")
+_KINDS: dict[str, Shape] = {
     "plane": Shape(
         "A horizontal rectangle facing +Y.",
         (
@@ -356,3 +398,4 @@ SHAPES: dict[str, Shape] = {
         lambda v: (v["segments"] + 1) * (v["rings"] + 1),
     ),
 }
+SHAPES = {name: replace(shape, keys=(*shape.keys, _UV)) for name, shape in _KINDS.items()}

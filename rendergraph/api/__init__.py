@@ -20,6 +20,7 @@ from rendergraph.declare import Part as Part
 from rendergraph.declare import Port as Port
 from rendergraph.declare import SceneKey as SceneKey
 from rendergraph.declare import TextureInfo as TextureInfo
+from rendergraph.declare import TextureKind as TextureKind
 from rendergraph.declare import Views as Views
 from rendergraph.declare import casting_lights as casting_lights
 from rendergraph.declare import define as define

@@ -295,9 +295,13 @@ class GpuScene(Struct, eq=False, dict=True):
             return
         from concurrent.futures import ThreadPoolExecutor  # for scenes with images alone
 
+        files = [key for key in missing if key[0].generated is None]
         with ThreadPoolExecutor() as pool:
-            for key, pixels in zip(missing, pool.map(lambda k: self.decode(*k), missing), strict=True):
+            for key, pixels in zip(files, pool.map(lambda k: self.decode(*k), files), strict=True):
                 self._images[key] = self._upload(pixels, srgb=key[1])
+        for key in missing:
+            if key[0].generated is not None:  # by this thread's context
+                self._images[key] = self._upload(self.decode(*key), srgb=key[1])
 
     def environment(self) -> GpuTexture:
         """The picture around the scene, decoded and uploaded when somebody first asks."""

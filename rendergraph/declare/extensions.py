@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeAlias, TypeVar, get_args
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from rendergraph.declare.blame import describe_error, source_location
-from rendergraph.declare.scene_keys import SceneKey, Section
+from rendergraph.declare.scene_keys import SceneKey, Section, TextureKind
 from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
 from rendergraph.glsl import about
 from rendergraph.stamps import Stamps, replay_reads, track_reads
@@ -83,6 +84,7 @@ class Extension(Struct, frozen=True):
         metrics: name to a function of two pictures, (height, width, 3) in float64, sRGB-encoded from 0 to 1 where they
             are display-referred and linear otherwise, the second the reference; the result grows with the error.
         scene_keys: section of scene files (`objects`, `materials`, `lights`, `cameras`) to further keys of its entries.
+        textures: kinds of generated textures for the materials of scene files.
     """
 
     semantics: tuple[Semantic, ...] = ()
@@ -91,6 +93,7 @@ class Extension(Struct, frozen=True):
     images: Mapping[Ending, ImageLoader] = {}
     metrics: Mapping[Word, Metric] = {}
     scene_keys: Mapping[Section, tuple[SceneKey, ...]] = {}
+    textures: Mapping[Word, TextureKind] = {}
 
 
 READ_IMAGES = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga")
@@ -117,6 +120,10 @@ def extension_mistakes(extension: Extension, folder: Path) -> list[Problem]:
     for field, (taken, text) in _TAKEN.items():
         names = [name for name in getattr(extension, field) if name in taken]
         mistakes += [Problem("RG495", text.format(name), subject=field) for name in names]
+    for name, kind in extension.textures.items():
+        wrong = kind.mistake() or ("" if (folder / kind.shader).is_file() else f"has no file '{kind.shader}' beside it")
+        if wrong:
+            mistakes.append(Problem("RG495", f"textures['{name}'] {wrong}", subject="textures"))
     for section, keys in extension.scene_keys.items():
         named = [key.name for key in keys]
         for key in keys:
@@ -259,6 +266,15 @@ class Extensions:
             if name == section
         ]
 
+    def textures(self) -> dict[str, TextureKind]:
+        """Kinds of generated textures, their shaders absolute; two plugins with one name are an error."""
+        added: list[Added[TextureKind]] = self._added("textures")
+        return {
+            one.name: replace(one.value, shader=one.file.parent / one.value.shader)
+            for one in added
+            if _one("kind of texture", one.name, added)
+        }
+
     def scene_key(self, section: str, name: str) -> Added[SceneKey] | None:
         """A key by name; two plugins with one name are an error."""
         return _one(f"key of {section}", name, self.scene_keys(section))
@@ -267,7 +283,12 @@ class Extensions:
         """Everything that plugins add, as plain values: `kind`, `name`, `plugin`, `doc`."""
         rows: list[tuple[str, Added[Any]]] = [("semantic", added) for added in self.semantics()]
         rows += self._choices()
-        for field, kind in (("meshes", "mesh loader"), ("images", "image loader"), ("metrics", "metric")):
+        for field, kind in (
+            ("meshes", "mesh loader"),
+            ("images", "image loader"),
+            ("metrics", "metric"),
+            ("textures", "kind of texture"),
+        ):
             rows += [(kind, added) for added in self._added(field)]
         for section in get_args(Section):
             rows += [(f"key of {section}", added) for added in self.scene_keys(section)]
@@ -307,7 +328,7 @@ def _doc(value: object) -> str:
     """The first line of the documentation of what a plugin adds."""
     if isinstance(value, Path):
         return about(value)
-    doc = value.doc if isinstance(value, Semantic | SceneKey) else inspect.getdoc(value) or ""
+    doc = value.doc if isinstance(value, Semantic | SceneKey | TextureKind) else inspect.getdoc(value) or ""
     return doc.partition("\n")[0]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args, get_origin
 
 from msgspec import Struct
@@ -90,3 +91,28 @@ class SceneKey(Struct, frozen=True, dict=True):
             return vector(len(get_args(self.type)), low, high)
         simple = {float: number(low, high), int: Annotated[int, Range(low, high)], bool: bool, str: TEXT, Image: FILE}
         return simple.get(self.type, self.type)
+
+
+class TextureKind(Struct, frozen=True):
+    """A kind of generated texture for materials of scene files: `Extension.textures`.
+
+    Attributes:
+        doc: one line.
+        shader: a GLSL file, relative to the extension's module, that includes `<texture_sample.glsl>` and defines
+            `TextureSample texture_sample(vec2 uv)`.
+        keys: further keys of `texture: {kind: …}`, each a uniform of that file: floats, ints, and tuples of 2 to 4
+            floats.
+    """
+
+    doc: str
+    shader: str | Path
+    keys: tuple[SceneKey, ...] = ()
+
+    def mistake(self) -> str:
+        """What is wrong with the declaration, as the end of a sentence; empty if nothing is."""
+        for key in self.keys:
+            if wrong := key.mistake():
+                return f"has the key '{key.name}', which {wrong}"
+            if key.default is None or key.type in (str, Image) or get_origin(key.type) is Literal:
+                return f"has the key '{key.name}', which is no number or tuple with a default"
+        return "" if self.doc.strip() else "has no documentation (doc)"

@@ -110,10 +110,11 @@ class MapOf(Struct, frozen=True):
 
 
 class Recursive(Struct, frozen=True):
-    """A table that holds itself, which `table` gives, or a value of a type in its place."""
+    """A table, or a value of a type in its place; `itself` says that it is the table of the whole file."""
 
     type: Any
     table: Callable[[], Table]
+    itself: bool = True
 
 
 Type: TypeAlias = "Table | MapOf | Recursive | Any"
@@ -130,7 +131,7 @@ def brief(type: Type) -> str:
 def plain(value: Value, type: Type) -> Any:
     """Return a validated value as plain Python, as its type converts it; null is left out of mappings."""
     if isinstance(type, Recursive):
-        return value.plain()
+        type = type.table() if isinstance(value.data, dict) and not type.itself else Any
     if not isinstance(type, Table | MapOf):
         return conversion_to(type)(value.plain())
     given = {name: child for name, child in value.items() if child.data is not None}
@@ -145,7 +146,7 @@ def plain(value: Value, type: Type) -> Any:
 
 def schema(type: Type) -> Schema:
     if isinstance(type, Recursive):
-        return {"anyOf": [json_schema(type.type), {"$ref": "#"}]}
+        return {"anyOf": [json_schema(type.type), {"$ref": "#"} if type.itself else {"type": "object"}]}
     if isinstance(type, Table):
         return _table(type)
     if not isinstance(type, MapOf):

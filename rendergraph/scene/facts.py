@@ -99,7 +99,7 @@ class FrameScene:
     def __init__(self, scene: Scene, before: FrameScene | None = None, decode: Decode | None = None) -> None:
         """Share with the scene of the frames until now what has not changed; `decode` is for `pixels`."""
         self.scene = self.placed = scene
-        self._decode = decode
+        self.decode = decode
         if before is None or "corners" not in vars(before) or before.placed.meshes is not scene.meshes:
             return
         moved = changed_objects(before.placed, scene)
@@ -131,8 +131,8 @@ class FrameScene:
         return self.scene.camera
 
     def pixels(self, image: ImageSource) -> npt.NDArray[np.float32]:
-        assert self._decode is not None, "only a scene that is drawn has pixels"
-        found = self._decode(image, False)
+        assert self.decode is not None, "only a scene that is drawn has pixels"
+        found = self.decode(image, False)
         return found.astype(np.float32) / np.float32(255 if found.dtype == np.uint8 else 1)
 
     @cached_property

@@ -151,8 +151,16 @@ class SceneLimits(Struct, frozen=True):
         return f"{what}, the limit is {getattr(self, limit):,}; --limit scene-{limit.replace('_', '-')}=N allows more"
 
 
+class GeneratedTexture(Struct, frozen=True):
+    """A map of a generated texture: the shader of its kind and the values of its uniforms and of `resolution`."""
+
+    shader: Path
+    values: tuple[tuple[str, Any], ...]
+    map: Literal["color", "normal", "surface"]
+
+
 class ImageSource(Struct, frozen=True):
-    """An image not yet decoded: a file, or bytes inside another file.
+    """An image not yet decoded: a file, bytes inside another file, or one that is generated.
 
     Attributes:
         path: the file it comes from, also if `data` has its bytes.
@@ -167,6 +175,7 @@ class ImageSource(Struct, frozen=True):
     loader: Added[ImageLoader] | None = None
     size: tuple[int, int] | None = None
     channels: int = 0
+    generated: GeneratedTexture | None = None
 
     def __repr__(self) -> str:
         embedded = f", {len(self.data)} bytes" if self.data is not None else ""

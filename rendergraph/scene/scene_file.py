@@ -16,7 +16,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from rendergraph.declare import Section
+from rendergraph.declare import Section, TextureKind
 from rendergraph.document import Value, load, shown
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.facts import NO_EXTRA, Extra
@@ -29,6 +29,8 @@ from rendergraph.scene.mesh_files import MESHES, read_mesh
 from rendergraph.scene.model import (
     Camera,
     Environment,
+    GeneratedTexture,
+    ImageSource,
     Light,
     Material,
     Matrix,
@@ -42,11 +44,14 @@ from rendergraph.scene.model import (
 from rendergraph.scene.reading import Reading
 from rendergraph.scene.repeat import Copies, copies, count_of, read_columns
 from rendergraph.scene.shapes import SHAPES, ShapePart, build
+from rendergraph.scene.textures import TEXTURES as SHIPPED_TEXTURES
+from rendergraph.stamps import record_read
 
 if TYPE_CHECKING:
     from rendergraph.scene.rig import Rig
 
 _DEFAULT = Material("default", base_color=(0.8, 0.8, 0.8, 1.0))
+_GENERATED = ("base_color", "normal", "metallic_roughness", "occlusion")
 _SRGB = ("base_color", "emissive", "specular_color", "sheen_color")
 
 
@@ -95,6 +100,7 @@ class _Reader:
         self.names: dict[str, tuple[str, ...]] = {}
         self.table, self.sections = scene_keys.SCENE, scene_keys.SECTIONS
         self.plugin_keys: dict[str, frozenset[str]] = {}
+        self.kinds: Mapping[str, TextureKind] = SHIPPED_TEXTURES
         self.vertices = 0
 
     def read(self, root: Value) -> Scene:
@@ -132,15 +138,18 @@ class _Reader:
     def _add_plugin_keys(self, root: Value) -> None:
         """Ask the plugins if the file has keys that are not rendergraph's own."""
         asked = _unknown_keys(root)
-        if not any(asked.values()):
+        if has_unknown_kinds := not _kinds(root) <= self.kinds.keys():
+            self.kinds = {**self.kinds, **self.reading.extensions.textures()}
+        if not any(asked.values()) and not has_unknown_kinds:
             return
-        self.sections = scene_keys.with_plugins(self.reading.extensions, asked)
+        self.sections = scene_keys.with_plugins(self.reading.extensions, asked, self.kinds)
         self.table = scene_keys.scene_table(self.sections)
         own = scene_keys.SECTIONS
         for section, table in self.sections.items():
             self.plugin_keys[section] = frozenset(key.name for key in table.keys[len(own[section].keys) :])
         known = self.plugin_keys
-        if any(not names <= known[section] for section, names in asked.items()):
+        is_known = all(names <= known[section] for section, names in asked.items())
+        if not is_known or not _kinds(root) <= self.kinds.keys():
             self.validator.problems += self.reading.extensions.problems
 
     def _plain(self, section: str, entry: Value) -> dict[str, Any]:
@@ -187,17 +196,33 @@ class _Reader:
 
     def _material(self, name: str, entry: Value) -> None:
         values = self._plain("materials", entry)
-        textures = {}
+        whole = values.pop("texture", {})
+        textures = {slot: self._generated(slot, whole) for slot in _GENERATED if "kind" in whole}
         for key, _ in scene_keys.TEXTURES:
             if key in values:
                 slot = key.removesuffix("_texture")
                 place, file = _value(entry, key), values.pop(key)
+                if isinstance(file, dict):
+                    textures |= {slot: self._generated(slot, file)} if "kind" in file else {}
+                    continue
                 with self._reading_file(place):
                     image = self.reading.image(self.reading.resolve(file, line=place.line), "image", line=place.line)
                     textures[slot] = Texture(image, slot in _SRGB)
         self.recipe["materials", name] = values
         self.material_numbers[name] = len(self.materials)
         self.materials.append(scene_values.material(name, values, textures))
+
+    def _generated(self, slot: str, values: Mapping[str, Any]) -> Texture:
+        """One slot's map of a generated texture."""
+        kind = self.kinds[values["kind"]]
+        given = {"seed": 0, "resolution": 512, **{key.name: key.default for key in kind.keys}, **values}
+        rate = 1 / given.pop("scale", 1.0)
+        name, size = given.pop("kind"), (given["resolution"],) * 2
+        which: Any = "color" if slot in _SRGB else "normal" if slot.endswith("normal") else "surface"
+        record_read(Path(kind.shader))
+        made = GeneratedTexture(Path(kind.shader), tuple(given.items()), which)
+        image = ImageSource(made.shader, None, f"texture {name}", None, size, 4, made)
+        return Texture(image, slot in _SRGB, transform=None if rate == 1 else (rate, 0.0, 0.0, 0.0, rate, 0.0))
 
     def _light(self, name: str, entry: Value) -> None:
         self.recipe["lights", name] = values = self._plain("lights", entry)
@@ -510,6 +535,12 @@ def _unknown_keys(root: Value) -> dict[str, set[str]]:
         if section in found and key not in scene_keys.NAMES[section]:
             found[section].add(key)
     return found
+
+
+def _kinds(root: Value) -> set[str]:
+    """The kinds of generated textures that a file asks for."""
+    values = [value for entry in _entries(root, "materials").values() for value in entry.mapping.values()]
+    return {str(kind.data) for value in values if (kind := value.get("kind")) is not None}
 
 
 def _entries(value: Value, section: str) -> dict[str, Value]:

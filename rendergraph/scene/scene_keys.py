@@ -8,11 +8,12 @@ from typing import Annotated, Any, get_args
 
 from msgspec.structs import replace
 
-from rendergraph.declare import Extensions, Section
+from rendergraph.declare import Extensions, Section, TextureKind
 from rendergraph.errors import InputError, Place, Problem, shown_file
-from rendergraph.keys import Codes, Key, MapOf, Table, schema
+from rendergraph.keys import Codes, Key, MapOf, Recursive, Table, schema
 from rendergraph.keys.values import FILE, TEXT, choice, color, listed, number, row, scale, vector, version, whole, word
 from rendergraph.scene.shapes import LENGTH, SHAPES
+from rendergraph.scene.textures import TEXTURES as TEXTURE_KINDS
 from rendergraph.typecheck import Brief, JsonSchema, Schema, is_numeric
 
 _DIRECTION = "unit length is not needed"
@@ -126,6 +127,25 @@ TEXTURES = (
 )
 
 
+_TEXTURE_KEYS = (
+    Key("scale", LENGTH, "Width of one tile in texture coordinates: metres where a shape has `uv: metres`.", 1.0),
+    Key("seed", whole(0, 65535), "Another number gives another pattern.", 0),
+    Key("resolution", whole(16, 4096), "Width and height of the images.", 512, "texels"),
+)
+
+
+def texture_keys(kinds: Mapping[str, TextureKind]) -> tuple[Key, ...]:
+    """Return the keys of a material that take textures; `kinds` are those that can be generated."""
+    table = Table(
+        "texture",
+        (Key("kind", choice(*kinds), "What it looks like; each has keys of its own."), *_TEXTURE_KEYS),
+        {"kind": {name: tuple(key.key for key in kind.keys) for name, kind in kinds.items()}},
+    )
+    doc = "A generated texture: base colour, normals, occlusion, roughness and metallic at once."
+    image = Recursive(FILE, lambda: table, itself=False)
+    return (Key("texture", table, doc), *(Key(name, image, about) for name, about in TEXTURES))
+
+
 def _unit(name: str, doc: str, default: float) -> Key:
     return Key(name, number(0, 1), doc, default)
 
@@ -171,7 +191,7 @@ MATERIAL = Table(
         Key("diffuse", color(1), "kd of the empirical models; base (1 − metallic) by default."),
         Key("specular_phong", color(1), "ks of the empirical models; f0 by default."),
         Key("shininess", number(0, 1_000_000), "Exponent n of `phong`; from the roughness by default."),
-        *(Key(name, FILE, doc) for name, doc in TEXTURES),
+        *texture_keys(TEXTURE_KINDS),
     ),
 )
 
@@ -258,8 +278,10 @@ def moving(table: Table) -> dict[str, Key]:
     return {key.name: key for key in table.keys if is_numeric(key.type)}
 
 
-def with_plugins(extensions: Extensions, asked: Mapping[str, Iterable[str]] = {}) -> dict[str, Table]:
-    """Return `SECTIONS` with the keys that plugins add.
+def with_plugins(
+    extensions: Extensions, asked: Mapping[str, Iterable[str]] = {}, kinds: Mapping[str, TextureKind] = TEXTURE_KINDS
+) -> dict[str, Table]:
+    """Return `SECTIONS` with the keys that plugins add, and with these kinds of generated textures.
 
     Args:
         asked: the names that somebody uses, by section; two plugins with one of them are an error.
@@ -268,6 +290,9 @@ def with_plugins(extensions: Extensions, asked: Mapping[str, Iterable[str]] = {}
         InputError: a plugin's key has the name of one of rendergraph's own (RG495), or of another plugin's (RG496).
     """
     found = dict(SECTIONS)
+    if kinds is not TEXTURE_KINDS:
+        own = MATERIAL.keys[: -1 - len(TEXTURES)]
+        found["materials"] = replace(MATERIAL, keys=(*own, *texture_keys(kinds)))
     for section in get_args(Section):
         added = {one.name: one for one in extensions.scene_keys(section)}
         for name in asked.get(section, ()):

@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from rendergraph import stamps
 from rendergraph.compile import Executable, GpuScene, KeptValues, ProgramCache, TexturePool, compile_plan
+from rendergraph.compile.generated import TextureGenerator
 from rendergraph.declare import Node
 from rendergraph.errors import Problem
 from rendergraph.expand import Expansion
@@ -57,6 +58,7 @@ class GpuCache:
         self.programs = ProgramCache(device, limits.programs)
         self.kept = KeptValues(device, limits.bytes // 16)
         self._pool = TexturePool(device)
+        self._generator = TextureGenerator(self.programs)
         self.scenes_made = 0
         self.image_warnings: list[Problem] = []
         self.active: Executable | None = None
@@ -78,6 +80,8 @@ class GpuCache:
         warnings: list[Problem] = []
 
         def decoded(source: ImageSource, srgb: bool) -> npt.NDArray[Any]:
+            if source.generated is not None:
+                return self._generator.texels(source)
             return decode(source, srgb=srgb, warn=warnings.append, limits=limits)
 
         def decoded_light(source: ImageSource | MadeImage) -> npt.NDArray[Any]:

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+from rendergraph.pipelines.textures import TEXTURES
 
 import rendergraph as rg
 from rendergraph.authoring.examine import doc_problems, examine
@@ -123,8 +124,17 @@ def test_no_shader_is_an_orphan() -> None:
             for origin in Includes(SHADERS / "include").expand(shader, root=shader.parent).origins
             if origin.file is not None
         }
-    others = ("frame.glsl", "view.glsl", "fullscreen.vert", "previous_scene.glsl", "pose.comp")
+    others = (
+        "frame.glsl",
+        "view.glsl",
+        "fullscreen.vert",
+        "previous_scene.glsl",
+        "pose.comp",
+        "texture.comp",
+        "texture_sample.glsl",
+    )
     spare = {SHADERS / "include" / name for name in others}
+    spare |= {Path(kind.shader) for kind in TEXTURES.values()}
     files = {path.resolve() for path in SHADERS.rglob("*") if path.suffix in STAGES | {".glsl"}}
     assert files - used - {path.resolve() for path in spare} == set()
 

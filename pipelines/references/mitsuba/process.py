@@ -21,7 +21,9 @@ from rendergraph.pipelines.references.mitsuba.convert import camera_values, scen
 from rendergraph.pipelines.references.mitsuba.installation import require
 
 from rendergraph.errors import Problem, RenderError
-from rendergraph.images import decode, decode_light, from_srgb
+from rendergraph.images import decode as decode_file
+from rendergraph.images import decode_light, from_srgb
+from rendergraph.scene.facts import Decode
 from rendergraph.scene.model import ImageSource, MadeImage, Scene, SceneLimits
 from rendergraph.steps import ViewMatrices
 
@@ -47,6 +49,7 @@ class Tracer:
         ambient: constant radiance from all sides that the camera does not see, for scenes without an environment.
         shadows: False lets punctual lights through everything.
         jitter: samples fill the pixel; False takes all in its middle.
+        decode: of the scene's textures; it is needed where some are generated.
 
     Raises:
         UsageError: Mitsuba or a usable LLVM is not installed.
@@ -65,6 +68,7 @@ class Tracer:
         shadows: bool = True,
         jitter: bool = True,
         limits: SceneLimits = SceneLimits(),
+        decode: Decode | None = None,
     ) -> None:
         llvm = require()
 
@@ -72,7 +76,8 @@ class Tracer:
             if scene.environment is not None and image is scene.environment.image:
                 return linear(decode_light(image, limits=limits), False)
             assert isinstance(image, ImageSource)  # only environments are generated
-            return linear(decode(image, srgb=srgb, limits=limits), srgb)
+            found = decode(image, srgb) if decode else decode_file(image, srgb=srgb, limits=limits)
+            return linear(found, srgb)
 
         request, arrays = scene_values(scene, texels)
         request |= {"camera": camera_values(view), "bounces": bounces, "seed": seed}

@@ -49,6 +49,7 @@ class MitsubaLight(Node):
         if frame.changed() or self not in _TRACERS:
             scene: Any = frame.scene
             options: Any = {"bounces": self.max_bounces, "shared": self.diffuse_lobe == "fresnel"}
+            options["decode"] = scene.decode
             _TRACERS[self] = Tracer(scene.scene, frame.camera, ambient=(self.ambient,) * 3, **options), 0
         tracer, taken = _TRACERS[self]
         taken += self.samples

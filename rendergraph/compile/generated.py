@@ -1,0 +1,79 @@
+"""Generated textures: a compute shader evaluates a kind's GLSL file when a scene that uses it is loaded."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from msgspec import Struct, field
+
+from rendergraph.compile.programs import ProgramCache
+from rendergraph.gl import textures
+from rendergraph.glsl import Includes
+from rendergraph.glsl.source import generated
+from rendergraph.program.text import VERSION, StageText
+from rendergraph.resources import folder
+from rendergraph.scene.model import GeneratedTexture, ImageSource
+from rendergraph.textures import TextureDesc
+
+Maps: TypeAlias = Mapping[str, npt.NDArray[np.uint8]]
+_MOST_KEPT = 64 << 20
+_POINTS = 2
+"""Points along each side of a texel whose mean it is."""
+_FORMATS = ("rgba8", "rgba32f", "rgba8", "rgba8")
+_MAPS = {"color": 0, "normal": 2, "surface": 3}
+_READ_WRITE, _ALL_BARRIERS = 0x88BA, 0xFFFFFFFF
+
+
+class TextureGenerator(Struct, eq=False):
+    """Evaluates generated textures, and keeps the texels of the latest ones for the scenes that follow."""
+
+    programs: ProgramCache
+    _kept: dict[Hashable, Maps] = field(default_factory=dict)
+
+    def texels(self, source: ImageSource) -> npt.NDArray[np.uint8]:
+        """Return one map of a generated texture, (height, width, 4), top row first."""
+        assert source.generated is not None  # others are decoded
+        text = _text(source.generated.shader)
+        key = text.text, source.generated.values
+        if key not in self._kept:
+            self._kept[key] = self._evaluate(text, source.generated)
+            while len(self._kept) > 1 and sum(map(_bytes, self._kept.values())) > _MOST_KEPT:
+                self._kept.pop(next(iter(self._kept)))
+        return self._kept[key][source.generated.map]
+
+    def _evaluate(self, text: StageText, texture: GeneratedTexture) -> Maps:
+        device, values = self.programs.device, dict(texture.values)
+        side = values.pop("resolution")
+        program = self.programs.get({"compute": text}, {}, ())
+        images = []
+        try:
+            for unit, name in enumerate(_FORMATS):
+                desc = TextureDesc("texture2d", name, side, side)
+                images.append(textures.create(device, desc, "a generated texture"))
+                texel_format = 0x8814 if name == "rgba32f" else 0x8058
+                device.raw.glBindImageTexture(unit, images[unit].glo, 0, 0, 0, _READ_WRITE, texel_format)
+            for phase in (0, 1):
+                for name, value in {**values, "points": _POINTS, "phase": phase}.items():
+                    if (write := program.writer(name, value)) is not None:
+                        write()
+                program.object.run(-(-side // 8), -(-side // 8))
+                device.raw.glMemoryBarrier(_ALL_BARRIERS)
+            return {name: np.ascontiguousarray(textures.read(device, images[n])[0][::-1]) for name, n in _MAPS.items()}
+        finally:
+            for image in images:
+                textures.delete(device, image)
+
+
+def _bytes(maps: Maps) -> int:
+    return sum(texels.nbytes for texels in maps.values())
+
+
+def _text(shader: Path) -> StageText:
+    """The program text of a kind."""
+    include = folder("rendergraph.shaders") / "include"
+    body = Includes(include).expand(include / "texture.comp", plugged={"TEXTURE": shader})
+    return StageText("compute", generated([VERSION]) + body)
