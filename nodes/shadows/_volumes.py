@@ -41,7 +41,6 @@ OUTSIDE_VOLUMES = Stencil(StencilFace(func="equal"))
 CLEAR_COUNT = Stencil(StencilFace(depth_pass="zero"))
 """Clears the count."""
 _NAMES = {Z_PASS: "z-pass", Z_FAIL: "z-fail"}
-DEPTH_OFFSET = -16.0  # away from the eye, so that a lit face is not behind the near cap that coincides with it
 
 
 class HasVolumes(Casting):
@@ -157,8 +156,6 @@ class CountsVolumes(HasVolumes):
                 depth_func="greater",
                 depth_write=False,
                 depth_clamp=self.depth_clamp,
-                # Only Z-fail has near caps. Sides need no offset: it would leave surfaces beside an edge undecided.
-                polygon_offset=(0.0, DEPTH_OFFSET) if method == Z_FAIL else None,
                 cull="none",
                 front="counter_clockwise",
                 stencil=_COUNTING[method],

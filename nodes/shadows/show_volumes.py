@@ -6,7 +6,7 @@ from typing import Literal
 
 from rendergraph.api import ALPHA, Depth, DisplayColor, InOut, Input, State, Steps, structural
 
-from ._volumes import DEPTH_OFFSET, Z_FAIL, HasVolumes
+from ._volumes import Z_FAIL, HasVolumes
 
 
 class ShowVolumes(HasVolumes):
@@ -33,7 +33,7 @@ class ShowVolumes(HasVolumes):
             depth_func="greater",
             depth_write=False,
             depth_clamp=True,
-            polygon_offset=(0.0, DEPTH_OFFSET),
+            polygon_offset=(0.0, -16.0),  # away from the eye: faces of casters are not covered by their caps
             cull="none",
             blend=ALPHA,
         )

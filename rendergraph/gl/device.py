@@ -131,7 +131,22 @@ class Device(Struct, eq=False, dict=True):
                     each.release()
             self.mips = self._idle = None
         if self.owned:
+            self._make_not_current()
             self.ctx.release()
+
+    def _make_not_current(self) -> None:
+        """Make no context current where this one is, which `current` leaves so if there was none before.
+
+        A driver may give a new context the handle of a destroyed one. GLVND skips making a handle current that it
+        takes for current, and what is drawn then goes nowhere.
+        """
+        egl = _egl()
+        if egl is None or not (before := egl.eglGetCurrentContext()):
+            return
+        with previous_context(), self.ctx:
+            is_own = egl.eglGetCurrentContext() == before
+        if is_own:
+            egl.eglMakeCurrent(egl.eglGetCurrentDisplay(), None, None, None)
 
 
 @cache

@@ -3,7 +3,7 @@
 #if DEPTH_SAMPLES > 1
 uniform sampler2DMS depth;
 const int TEXEL_CENTER = -1;
-#define SAMPLE_POSITION(index) DEPTH_SAMPLE_POSITIONS[index]
+#define SAMPLE_POSITION(index) DEPTH_SAMPLE_POSITIONS[max(index, 0)]  // drivers refuse a constant TEXEL_CENTER
 #else
 uniform sampler2D depth;
 const int TEXEL_CENTER = 0;

@@ -105,13 +105,14 @@ bool trace(
             int at = header2.w + 3 * ((-1 - node) >> 2), last = is_leaf ? at + 3 * ((-1 - node) & 3) : at - 1;
             for (; at <= last; at += 3) {
                 ivec4 first = scene_tree[at], second = scene_tree[at + 1], third = scene_tree[at + 2];
-                vec3 a = trace_permuted(intBitsToFloat(first.xyz) - object_origin, axis);
-                vec3 b = trace_permuted(intBitsToFloat(second.xyz) - object_origin, axis);
-                vec3 c = trace_permuted(intBitsToFloat(third.xyz) - object_origin, axis);
+                // Two triangles must compute the same numbers for a shared edge, so nothing may become a fused multiply-add.
+                precise vec3 a = trace_permuted(intBitsToFloat(first.xyz) - object_origin, axis);
+                precise vec3 b = trace_permuted(intBitsToFloat(second.xyz) - object_origin, axis);
+                precise vec3 c = trace_permuted(intBitsToFloat(third.xyz) - object_origin, axis);
                 a.xy -= shear.xy * a.z;
                 b.xy -= shear.xy * b.z;
                 c.xy -= shear.xy * c.z;
-                vec3 edges = vec3(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
+                precise vec3 edges = vec3(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
                 float sum = edges.x + edges.y + edges.z;
                 bool inside = all(greaterThanEqual(edges, vec3(0.0))) || all(lessThanEqual(edges, vec3(0.0)));
                 float distance = dot(edges, vec3(a.z, b.z, c.z)) * shear.z / sum;

@@ -18,6 +18,9 @@ void main() {
 #ifdef PEELED
     if (!nearer(texelFetch(previous_depth, texel, SAMPLE_INDEX).r, gl_FragCoord.z)) discard;
 #endif
+#if PASS_SAMPLES > 1
+    gl_FragDepth = gl_FragCoord.z;  // the rasteriser's depth of a sample may differ, and a layer would be peeled twice
+#endif
     vec3 color = radiance_of(s, direct_lighting(s), environment_lighting(s));
     layer = vec4(through_air(s.position, color) * s.alpha, s.alpha);
 }

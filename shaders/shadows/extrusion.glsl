@@ -14,6 +14,16 @@ vec4 to_clip(vec3 position) {
     return PASS_VIEW.view_projection * vec4(position, 1.0);
 }
 
+// Clip-space position of a near cap's vertex. The cap coincides with the lit face and must not be in front of it, so it
+// is moved away from the eye by more than two ways to compute a depth differ. A polygon offset would move the sides,
+// too, and those that cross the eye's plane by any distance.
+vec4 to_cap(vec3 position) {
+    const float ERROR = 16.0 / 16777216.0;  // of a float's value
+    vec4 clip = to_clip(position);
+    clip.z -= ERROR * (PASS_VIEW.eye.w > 0.0 ? 2.0 * abs(clip.z) : clip.w);
+    return clip;
+}
+
 // Clip-space position of a vertex extruded away from the light. To infinity it is (V - L, 0) for a local light, and the
 // single point -L for a directional one (Everitt and Kilgard 2002). An orthographic view cannot show such points, so w
 // is tiny there instead of 0, which is still beyond everything.

@@ -33,9 +33,9 @@ void main() {
     }
     int second = is_mirrored ? 2 : 1, third = is_mirrored ? 1 : 2;
 #if METHOD == Z_FAIL
-    emit(near[0]);
-    emit(near[second]);
-    emit(near[third]);
+    emit(to_cap(corners[0]));
+    emit(to_cap(corners[second]));
+    emit(to_cap(corners[third]));
     EndPrimitive();
 #endif
     if ((METHOD == Z_FAIL || length_of_sides > 0.0) && has_far_cap()) {

@@ -61,7 +61,8 @@ SHADERS = {
         layout(std430) buffer counts { uint bins[2]; };
         void main() {
             float value = texelFetch(source, ivec2(gl_GlobalInvocationID.xy), 0).r;
-            atomicAdd(bins[value > 0.5 ? 1 : 0], 1u);
+            int bin = value > 0.5 ? 1 : 0;  // chosen in the atomic's argument, it crashes the compiler of NVIDIA 580
+            atomicAdd(bins[bin], 1u);
         }""",
     "show.frag": """layout(std430) readonly buffer counts { uint bins[2]; };
         out vec2 color; void main() { color = vec2(bins[0], bins[1]); }""",

@@ -14,6 +14,7 @@ import pytest
 import rendergraph as rg
 from rendergraph.authoring.node_check import flush_deleted_programs
 from rendergraph.errors import InputError, Problem, RenderError, UsageError
+from rendergraph.gl import device
 from rendergraph.gl.raw import RawGL
 from rendergraph.resources import shipped_pipelines
 
@@ -195,6 +196,19 @@ def test_another_thread_may_not_close_a_session() -> None:
         thread.join()
         assert said == ["RG615 a session must be closed by the thread that created it; render and close it there"]
         assert session.render("shading-unlit", (8, 8))["image"].any()
+
+
+def test_a_closed_session_leaves_no_context_current() -> None:
+    """A handle that stays current after its context's end may be that of the next context, which GLVND then skips."""
+    egl = device._egl()
+    with rg.Session() as outer:
+        outer.render("shading-unlit", (8, 8))
+        before = egl.eglGetCurrentContext()
+        with rg.Session() as inner:
+            assert inner.render("shading-unlit", (8, 8))["image"].any()
+        assert egl.eglGetCurrentContext() == before
+        assert outer.render("shading-unlit", (8, 8))["image"].any()
+    assert not egl.eglGetCurrentContext()
 
 
 def test_a_context_that_its_owner_has_released_is_said() -> None:
