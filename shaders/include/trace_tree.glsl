@@ -105,7 +105,7 @@ bool trace(
             int at = header2.w + 3 * ((-1 - node) >> 2), last = is_leaf ? at + 3 * ((-1 - node) & 3) : at - 1;
             for (; at <= last; at += 3) {
                 ivec4 first = scene_tree[at], second = scene_tree[at + 1], third = scene_tree[at + 2];
-                // Two triangles must compute the same numbers for a shared edge, so nothing may become a fused multiply-add.
+                // Triangles must compute the same numbers for a shared edge: no fused multiply-add may come in.
                 precise vec3 a = trace_permuted(intBitsToFloat(first.xyz) - object_origin, axis);
                 precise vec3 b = trace_permuted(intBitsToFloat(second.xyz) - object_origin, axis);
                 precise vec3 c = trace_permuted(intBitsToFloat(third.xyz) - object_origin, axis);
