@@ -16,7 +16,8 @@ from rendergraph.version import __version__ as __version__
 if TYPE_CHECKING:
     from rendergraph.compare import sweep
     from rendergraph.errors import RendergraphError
-    from rendergraph.session import Frame, Pipeline, RenderOptions, Selection, Session, load
+    from rendergraph.session import Frame, Pipeline, RenderOptions, Selection, Session, load, loads
+    from rendergraph.session.python_values import Mesh, Object, Scene
     from rendergraph.settings import CacheLimits
     from rendergraph.viewer import view
 
@@ -27,12 +28,16 @@ if os.path.isfile(os.path.join(_around, "pyproject.toml")) and os.path.isdir(os.
 __all__ = [
     "CacheLimits",
     "Frame",
+    "Mesh",
+    "Object",
     "Pipeline",
     "RenderOptions",
     "RendergraphError",
+    "Scene",
     "Selection",
     "Session",
     "load",
+    "loads",
     "sweep",
     "view",
 ]
@@ -42,7 +47,8 @@ __getattr__, __dir__ = lazy_exports(
     {
         "compare": ("sweep",),
         "errors": ("RendergraphError",),
-        "session": ("Frame", "Pipeline", "RenderOptions", "Selection", "Session", "load"),
+        "session": ("Frame", "Pipeline", "RenderOptions", "Selection", "Session", "load", "loads"),
+        "session.python_values": ("Mesh", "Object", "Scene"),
         "settings": ("CacheLimits",),
         "version": ("__version__",),
         "viewer": ("view",),

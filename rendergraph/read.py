@@ -72,7 +72,12 @@ PIPELINE: Table = Table(
         Key("description", TEXT, "What the pipeline shows, in a line."),
         Key("extends", shipped(shipped_pipelines), "A shipped pipeline or a file; the rest is a merge patch on it."),
         SIZE,
-        Key("scene", shipped(shipped_scenes), "A shipped scene, a scene file, .obj, .gltf or .glb."),
+        Key(
+            "scene",
+            Annotated[shipped(shipped_scenes) | dict[Any, Any], "a scene's name, a file, or a mapping", Brief("scene")],
+            "A shipped scene, a scene file, .obj, .gltf or .glb; or a mapping with the keys of scene files, which with "
+            "`extends` changes another scene.",
+        ),
         Key(
             "plugins",
             listed(TEXT, "folders and packages"),

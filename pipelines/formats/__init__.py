@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rendergraph.scene.model import Scene
     from rendergraph.scene.reading import Reading
 
-MESHES = (".obj", ".gltf", ".glb")
+MESHES = (".obj", ".gltf", ".glb", ".npz")
 
 
 def read(path: Path, reading: Reading) -> Scene:
@@ -21,6 +21,10 @@ def read(path: Path, reading: Reading) -> Scene:
         from rendergraph.pipelines.formats.obj import read_obj  # each reader comes with its first file
 
         return read_obj(path, reading)
+    if path.suffix.lower() == ".npz":
+        from rendergraph.pipelines.formats.npz import read_npz  # each reader comes with its first file
+
+        return read_npz(path, reading)
     from rendergraph.pipelines.formats.gltf import read_gltf  # each reader comes with its first file
 
     return read_gltf(path, reading)

@@ -27,7 +27,7 @@ def renderer_or_other(selection: Selection) -> Selection:
     Raises:
         UsageError: the renderer, or what it needs, is not installed.
     """
-    name, colon, values = selection.source.partition(":")
+    name, colon, values = selection.label.partition(":")
     if name not in NAMES:
         return selection
     _installation(name).require()

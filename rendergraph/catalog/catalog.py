@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -11,12 +10,14 @@ from msgspec.structs import replace
 
 from rendergraph.catalog import find, modules
 from rendergraph.catalog.types import Listed, NodeType
-from rendergraph.declare import NO_EXTENSIONS, Extensions, Node
+from rendergraph.declare import NO_EXTENSIONS, Extensions, Node, type_name
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
 from rendergraph.installed import entry_points, plain
 
 GROUP = "rendergraph.nodes"
 """The entry point group; an entry's value is a package of node modules in folders by family."""
+NOTEBOOK = "notebook"
+"""The plugin of classes that a script or a notebook defines itself."""
 
 
 class Catalog:
@@ -32,6 +33,7 @@ class Catalog:
         self._listed = {name: tuple(found) for name, found in listed.items()}
         self._types = dict(types or {})
         self._loaded: dict[tuple[str, tuple[Listed, ...]], NodeType] = {}
+        self._classes: dict[str, type[Node]] = {}
         self.notes = notes
         """Warnings: what the environment names and is not there, as a folder of PATH need not be."""
         self.extensions = extensions
@@ -69,7 +71,8 @@ class Catalog:
                 notes += [problem.as_warning() for problem in error.problems]
         folders = [(find.package_of(path), path) for path in named if path.is_dir()]
         added = find.extensions(folders, [entry for entry in offered if entry.group == find.EXTENSIONS])
-        return cls(listed, extensions=added, notes=tuple(notes))
+        found = cls(listed, extensions=added, notes=tuple(notes))
+        return found.with_classes(own_classes()) if installed else found
 
     def with_file(self, name: str, file: Path) -> Catalog:
         """The same with one shader file under the name, which is most likely its path."""
@@ -80,21 +83,30 @@ class Catalog:
         listed = {name: list(those) for name, those in self._listed.items()}
         _add(listed, found)
         more = Catalog(listed, self._types, self.extensions, self.notes)
-        more._loaded = self._loaded
+        more._loaded, more._classes = self._loaded, self._classes
         return more
 
     @classmethod
     def of(cls, *classes: type[Node], shaders: Path = Path(), **named: type[Node]) -> Catalog:
         """A catalog of classes at hand, for tests; a type's name is the class's in snake case, or the keyword."""
-        named = {re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", c.__name__).lower(): c for c in classes} | named
-        files = {name: Path(getattr(sys.modules.get(c.__module__), "__file__", "") or "") for name, c in named.items()}
+        named = {type_name(c): c for c in classes} | named
+        files = {name: modules.file_of(c.__module__) for name, c in named.items()}
         return cls({}, {name: NodeType(name, "", c, files[name], shaders, "test") for name, c in named.items()})
 
+    def with_classes(self, named: Mapping[str, type[Node]]) -> Catalog:
+        """The same with classes of a running program, in place of other types of their names.
+
+        Their shaders are in the current folder, or in the folder of the class's module.
+        """
+        more = Catalog(self._listed, self._types, self.extensions, self.notes)
+        more._loaded, more._classes = self._loaded, {**self._classes, **named}
+        return more
+
     def __contains__(self, name: object) -> bool:
-        return name in self._types or name in self._listed
+        return any(name in known for known in (self._types, self._classes, self._listed))
 
     def names(self) -> list[str]:
-        return sorted(self._types.keys() | self._listed.keys())
+        return sorted(self._types.keys() | self._classes.keys() | self._listed.keys())
 
     def has_plugin(self, name: str) -> bool:
         """Whether something comes from a plugin of this name, spelled as packages or as modules are."""
@@ -107,7 +119,8 @@ class Catalog:
     def families(self) -> dict[str, list[str]]:
         table: dict[str, list[str]] = {}
         for name in self.names():
-            family = self._types[name].family if name in self._types else self._listed[name][0].family
+            known = self._types.get(name) or next(iter(self._listed.get(name, ())), None)
+            family = known.family if known is not None and name not in self._classes else ""
             table.setdefault(family, []).append(name)
         return dict(sorted(table.items()))
 
@@ -115,6 +128,10 @@ class Catalog:
         """Return a type, imported on first use."""
         if name in self._types:
             return self._types[name]
+        if (cls := self._classes.get(name)) is not None:
+            file = modules.file_of(cls.__module__)
+            listed = Listed(cls.__module__, "", file, (file.parent if file.name else Path()).resolve(), NOTEBOOK)
+            return self._types.setdefault(name, modules.of_class(name, cls, listed))
         if name not in self._listed:
             raise InputError(Problem("RG102", f"there is no node type '{name}'{suggestion(name, self.names())}"))
         key = (name, self._listed[name])
@@ -144,6 +161,13 @@ class Catalog:
         from rendergraph.catalog import shader  # most pipelines use no shader files
 
         return shader.load(name, listed, self.extensions)
+
+
+def own_classes() -> dict[str, type[Node]]:
+    """Return the node classes of the running script or notebook, by the names of their types."""
+    values = list(vars(sys.modules["__main__"]).values()) if "__main__" in sys.modules else []
+    classes = [value for value in values if isinstance(value, type) and issubclass(value, Node)]
+    return {type_name(cls): cls for cls in classes if cls.__module__ == "__main__" and cls.__name__[0] != "_"}
 
 
 def _add(listed: dict[str, list[Listed]], found: Iterable[tuple[str, Listed]]) -> None:

@@ -44,7 +44,11 @@ def load(name: str, listed: Listed) -> NodeType:
         names = ", ".join(cls.__name__ for cls in classes) or "none"
         text = f"the module of node type '{name}' must define one Node class, it has {names}"
         raise InputError(Problem("RG492", text, place))
-    (cls,) = classes
+    return of_class(name, classes[0], listed)
+
+
+def of_class(name: str, cls: type[Node], listed: Listed) -> NodeType:
+    """Return the node type of a class; an error if it declares its node wrongly."""
     problems = declaration_mistakes(cls)
     if not problems and not cls.ports():
         problems = [Problem("RG490", "the class has no ports; add an output, as in `color = Output(Radiance, doc=…)`")]
@@ -52,9 +56,14 @@ def load(name: str, listed: Listed) -> NodeType:
         who = f"node type '{name}'"
         raise InputError([p.relocate(declaration_of(cls, listed.file, p.subject), context=who) for p in problems])
     bases = [base.__module__ for base in cls.__mro__[1:] if issubclass(base, Node) and base is not Node]
-    folders = [_shaders_of(base, Path(sys.modules[base].__file__ or "")) for base in bases]
+    folders = [_shaders_of(base, file_of(base)) for base in bases]
     inherited = tuple(dict.fromkeys(folder for folder in folders if folder != listed.shaders))
     return NodeType(name, listed.family, cls, listed.file, listed.shaders, listed.plugin, inherited=inherited)
+
+
+def file_of(module: str) -> Path:
+    """Return the file of an imported module; that of a notebook has none."""
+    return Path(getattr(sys.modules.get(module), "__file__", None) or "")
 
 
 def _shaders_of(module: str, file: Path) -> Path:

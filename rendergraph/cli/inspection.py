@@ -47,12 +47,12 @@ def check(selection: Selection, as_json: bool, profile: str | None) -> None:
     from rendergraph.session.picture_metadata import is_picture
     from rendergraph.settings import Roots
 
-    if is_sweep(Path(selection.source)):
+    if is_sweep(Path(selection.label)):
         from rendergraph.cli.sweep import check_file
 
         if profile is not None:
             raise click.UsageError("--profile checks a pipeline, not a sweep file")
-        file = selection.source
+        file = selection.label
         runs, warnings = check_file(Path(file), lambda name: replace(selection, source=name))
         warn(warnings)
         say(f"{file}: a sweep of {amount(runs, 'run')}")
@@ -166,8 +166,8 @@ def config(selection: Selection, as_json: bool) -> None:
     from rendergraph.session import Selection, stages
     from rendergraph.session.picture_metadata import is_picture
 
-    if is_picture(selection.source) and selection == Selection(selection.source):
-        _of_picture(Path(selection.source), as_json)
+    if is_picture(selection.label) and selection == Selection(selection.label):
+        _of_picture(Path(selection.label), as_json)
         return
     spec = stages.resolve(selection).spec
     spec.check()

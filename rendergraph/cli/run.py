@@ -154,7 +154,7 @@ def _read(
     modes = modes_of(linked)
     ending = ".####.png" if len(modes.frames) > 1 else ".png"
     if not outputs and not taps and tap_all is None:
-        outputs = (Target("", _default(selection.source, ending)),)
+        outputs = (Target("", _default(selection.label, ending)),)
     if tap_all is not None:
         ports = every_port(stages.plan(stages.expand(linked, modes)))
         taps += tuple(
@@ -278,7 +278,7 @@ def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path])
             text = f"'{name}' is a buffer, which picture files cannot store; read it in Python as frame['{name}']"
             raise InputError(Problem("RG508", text))
     selection = linked.selection
-    named = [Path(name) for name in (selection.source, selection.scene, selection.environment) if name]
+    named = [Path(name) for name in (selection.label, selection.scene, selection.environment) if name]
     inputs = {os.path.realpath(name) for name in (*named, *files) if name.is_file()}
     seen: set[str] = set()
     for target in targets:

@@ -115,14 +115,13 @@ def compare(
     if not pipelines:
         raise UsageError(Problem("RG500", "there is no pipeline to compare"))
     given, reference = [as_pipeline(each) for each in pipelines], named_reference(reference)
-    catalogs = [each.catalog for each in (*given, reference) if isinstance(each, Pipeline)]
     with track_reads() as files:
         if isinstance(reference, Pipeline):
             reference = measured_at(reference, options.metric)
         variants = [measured_at(each, options.metric) for each in given]
         prepared = prepare_variants(variants, reference, options, names, twins=True)
     runner = Runner(prepared, options)
-    travels = all(catalog is None for catalog in catalogs)
+    travels = all(each.travels for each in (*given, reference) if isinstance(each, Pipeline))
     with (
         options.open_executor(len(given), travels=travels) as farm,
         report_progress(options.progress, "steps") as report,
@@ -176,7 +175,7 @@ def sweep(
         redrawn = sum((runs[n].folder / RUN).exists() for n in missing if n not in runner.results)
         if missing or prepared.other or prepared.truth:
             with (
-                options.open_executor(-(-len(missing) // MOST_RUNS), travels=base.catalog is None) as farm,
+                options.open_executor(-(-len(missing) // MOST_RUNS), travels=base.travels) as farm,
                 report_progress(options.progress, "runs") as report,
             ):
                 farm.upload_inputs(lambda: make_bundle(files, base.selection.plugins, prepared.modules))

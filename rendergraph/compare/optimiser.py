@@ -140,7 +140,7 @@ def search(
     parts: list[Sweep] = []
     # A batch is one task: this process renders it, unless an executor was named. It stays open between batches.
     with (
-        options.open_executor(1, travels=base.catalog is None) as farm,
+        options.open_executor(1, travels=base.travels) as farm,
         report_progress(options.progress, "runs") as report,
     ):
 

@@ -464,7 +464,7 @@ def measured_at(pipeline: Pipeline, metric: str | None) -> Pipeline:
     try:
         graph = measured.link().graph
     except InputError as error:
-        context = f"in {measured.selection.source}"
+        context = f"in {measured.selection.label}"
         raise error.relocated(
             lambda problem: (
                 problem.relocate(place, context=context) if problem.place and problem.place.option("patch") else problem

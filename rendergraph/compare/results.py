@@ -176,7 +176,7 @@ class Result:
         linked, plan = planned.linked, planned.plan
         return cls(
             name=name,
-            source=linked.selection.source,
+            source=linked.selection.label,
             memory=plan.memory.as_json(),
             pass_count=len(passes(plan)),
             graph=linked.graph,

@@ -271,7 +271,7 @@ class SweepFolder:
         """Write the line of a run that cannot be rendered, unless the last one has the same reason."""
         failure = Failure(run.name, run.settings, tuple(problems))
         if self.lines.get(run.key, {}).get("error") != failure.text:
-            source = run.planned.linked.selection.source
+            source = run.planned.linked.selection.label
             self.append({"key": run.key, "pipeline": source, **failure.as_json()})
         return failure
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from functools import cache
 from inspect import get_annotations
@@ -156,3 +157,8 @@ class Node:
                 elif plain or (name in found and not isinstance(value, Port)):
                     found[name] = Parameter("plain", value, name=name, type=hint)
         return found
+
+
+def type_name(cls: type[Node]) -> str:
+    """Return the name of the node type of a class that no module stands for: its own in snake case."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()

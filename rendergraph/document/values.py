@@ -6,6 +6,7 @@ import re
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from functools import cached_property
+from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -157,13 +158,18 @@ class Document(Struct, frozen=True, eq=False, dict=True):
 
 
 def from_plain(data: Any, source: Source) -> Value:
-    """Return Python data as values; tuples become lists, NumPy scalars and arrays become what they hold."""
+    """Return Python data as values; tuples become lists, NumPy scalars and arrays become what they hold.
+
+    Below an argument of Python, the place of each value is its path of keys: `nodes.ao.params.radius`.
+    """
     if hasattr(data, "tolist"):
         data = data.tolist()
     if isinstance(data, Mapping):
-        return Value({str(key): from_plain(child, source) for key, child in data.items()}, source)
+        return Value({str(key): from_plain(child, _below(source, key)) for key, child in data.items()}, source)
     if isinstance(data, list | tuple):
         return Value([from_plain(child, source) for child in data], source)
+    if isinstance(data, PathLike):
+        data = fspath(data)
     if data is None or isinstance(data, str | float) or (isinstance(data, int) and abs(data) < 2**63):
         return Value(data, source)
     raise InputError(
@@ -171,6 +177,29 @@ def from_plain(data: Any, source: Source) -> Value:
             "RG106", f"{shown(repr(data))} cannot be written to a file; use text, numbers, lists and mappings"
         )
     )
+
+
+def merge_patch(target: Value | None, patch: Value, *, keep_nulls: bool = False) -> Value:
+    """RFC 7386: mappings merge, null removes, everything else replaces; each value keeps its own place.
+
+    With `keep_nulls` a null stays, to remove from what the result is merged into.
+    """
+    if not isinstance(patch.data, dict):
+        return patch
+    merged = dict(target.mapping) if target is not None else {}
+    for key, value in patch.data.items():
+        if value.data is None and not keep_nulls:
+            merged.pop(key, None)
+        else:
+            merged[key] = merge_patch(merged.get(key), value, keep_nulls=keep_nulls)
+    return patch.with_data(merged)
+
+
+def _below(source: Source, key: object) -> Source:
+    origin = source.origin
+    if isinstance(origin, str) or origin.name.startswith("-"):
+        return source
+    return Source(Option(origin.name, ".".join(filter(None, (origin.text, str(key))))))
 
 
 def kind_of(data: object) -> str:

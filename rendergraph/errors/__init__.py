@@ -33,14 +33,16 @@ class Option(Struct, frozen=True):
     """A command-line option as the origin of a mistake, or the argument of the Python API that corresponds to it.
 
     Attributes:
-        name: `--set`, or `patch` for a patch given in Python.
-        text: as typed; empty if only the option matters.
+        name: `--set`, or `pipeline` or `patch` for values given in Python.
+        text: as typed; empty if only the option matters. Of a value in Python its keys: `nodes.ao.params.radius`.
     """
 
     name: str
     text: str = ""
 
     def __str__(self) -> str:
+        if self.text and not self.name.startswith("-"):
+            return f"{self.name}.{printable(self.text)}"
         text = self.text if len(self.text) <= _LONGEST_OPTION else self.text[: _LONGEST_OPTION - 1] + "…"
         return f"{self.name} {printable(text)}" if text else self.name
 

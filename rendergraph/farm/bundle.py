@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import replace
 
@@ -146,12 +146,13 @@ def check_packages(needed: Mapping[str, tuple[str, str]], worker: str) -> InputE
 def relocate_selection(selection: Selection, root: Path | None) -> Selection:
     if root is None:
         return selection
+    source = selection.source
     return replace(
         selection,
-        source=str(_relocate(Path(selection.source), root)),
+        source=source if isinstance(source, str) and "\n" in source else _relocated(source, root),
         scene=None if selection.scene is None else str(_relocate(Path(selection.scene), root)),
         environment=None if selection.environment is None else _relocate(selection.environment, root),
-        patches=tuple(_relocate(each, root) if isinstance(each, Path) else each for each in selection.patches),
+        patches=tuple(_relocated(each, root) for each in selection.patches),
         asset_roots=tuple(_relocate(each, root) for each in selection.asset_roots),
         plugins=tuple(_relocate(each, root) for each in selection.plugins),
     )
@@ -159,6 +160,17 @@ def relocate_selection(selection: Selection, root: Path | None) -> Selection:
 
 def _relocate(path: Path, root: Path) -> Path:
     return root / path.relative_to(path.anchor) if path.is_absolute() else path
+
+
+def _relocated(value: Any, root: Path) -> Any:
+    """Return a value of Python with each absolute path in it, such as that of an array, beneath a worker's folder."""
+    if isinstance(value, Mapping):
+        return {key: _relocated(child, root) for key, child in value.items()}
+    if isinstance(value, list):
+        return [_relocated(child, root) for child in value]
+    if isinstance(value, Path):
+        return _relocate(value, root)
+    return str(_relocate(Path(value), root)) if isinstance(value, str) and value.startswith("/") else value
 
 
 def map_remote_paths(error: RendergraphError, root: Path | None) -> RendergraphError:

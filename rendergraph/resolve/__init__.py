@@ -9,19 +9,20 @@ from typing import Any
 
 from rendergraph.catalog import Catalog
 from rendergraph.document import Document, Source, Value, YamlLimits, from_plain, is_standard_input
+from rendergraph.document import merge_patch as merge_patch
 from rendergraph.errors import InputError, Option, Place, Problem, shown_file, suggestion
 from rendergraph.keys import Validator, plain
 from rendergraph.read import CODES, SIZE, checked, entries, flag, read, word
 from rendergraph.resolve.files import Files
 from rendergraph.resolve.flatten import Flattener, parameters
-from rendergraph.resolve.patches import diff, merge_patch, patch_of, settings
+from rendergraph.resolve.patches import diff, patch_of, settings
 from rendergraph.resolve.spec import DEFAULT_SIZE, NodeSpec, PipelineParameter, PipelineSpec, Scope, to_yaml
 from rendergraph.resources import is_name, shipped_pipelines, shipped_scenes
 from rendergraph.settings import Roots
 
 
 def resolve(
-    source: str | Path | Document,
+    source: str | Path | Document | Mapping[str, Any],
     *,
     catalog: Catalog,
     patches: Sequence[Path | Mapping[str, Any]] = (),
@@ -36,6 +37,7 @@ def resolve(
     Mistakes that do not stop the resolving are in its `problems`, for `link` to raise with its own.
 
     Args:
+        source: a shipped name, a file, YAML text of several lines, or plain data.
         patches: merge patches, files or plain data, applied in order.
         sets: `PATH=VALUE` texts or a mapping of paths to values; together one patch, types first.
         asset_roots: further folders that files may be read from.
@@ -49,11 +51,14 @@ def resolve(
     files.plugins.start(home, roots)
     files.own(document, None if is_shipped else roots)
     tree = files.chain(document)
-    for patch in patches:
-        tree = files.patched(tree, _patch(patch, files, limits))
     overrides: dict[str, Value] = {}
     if scene is not None:
         overrides["scene"] = Value(str(scene), Source(Option("--scene", str(scene)), Path.cwd() / "--scene"))
+        tree = tree.updated(overrides)
+    for patch in patches:
+        tree = files.patched(tree, _patch(patch, files, limits))
+    if isinstance((value := tree.get("scene") or tree).data, dict) and value is not tree:
+        overrides.pop("scene", None)  # a patch changes the scene that was chosen
     if size is not None:
         overrides["size"] = from_plain(list(size), Source(Option("--size", f"{size[0]}x{size[1]}")))
     tree = tree.updated(overrides)
@@ -64,7 +69,7 @@ def resolve(
     flat = Flattener(files)
     tree = flat.flatten(tree, "", {}, [s for s in wanted if s.scope])
     _complete(tree, files)
-    found, roots = _scene(tree, files, scene)
+    found, changes, roots = _scene(tree, files, scene)
     tree = _with_plugins(_with_scene(tree, found, document), files)
     return PipelineSpec(
         name=document.path.stem if document.path else Path(str(document.source.origin)).stem,
@@ -72,6 +77,7 @@ def resolve(
         description=word(tree, "description") or "",
         size=_size(tree, files),
         scene=found,
+        scene_changes=changes,
         roots=roots,
         nodes=flat.nodes,
         outputs=entries(tree, "outputs"),
@@ -88,9 +94,14 @@ def resolve(
     )
 
 
-def _entry(source: str | Path | Document, limits: YamlLimits) -> Document:
+def _entry(source: str | Path | Document | Mapping[str, Any], limits: YamlLimits) -> Document:
+    if isinstance(source, Mapping):
+        given = Source(Option("pipeline"))
+        source = Document(from_plain(source, given), given)
     if isinstance(source, Document):
         return checked(source, keep_going=True)
+    if isinstance(source, str) and "\n" in source:
+        return read(None, source, limits, name="pipeline", keep_going=True)
     if isinstance(source, str) and is_name(source) and not is_standard_input(source):
         shipped = shipped_pipelines()
         if source not in shipped:
@@ -153,10 +164,14 @@ def _size(tree: Value, files: Files) -> tuple[int, int]:
     return plain(good, SIZE.type) if good is not None else DEFAULT_SIZE
 
 
-def _scene(tree: Value, files: Files, typed: str | Path | None) -> tuple[Path | None, Roots]:
-    value = tree.get("scene")
+def _scene(tree: Value, files: Files, typed: str | Path | None) -> tuple[Path | None, Value | None, Roots]:
+    """Return the scene's file, what the pipeline changes in it or has instead of it, and where that may read from."""
+    value, changes = tree.get("scene"), None
+    if value is not None and isinstance(value.data, dict):
+        changes = value.with_data({key: entry for key, entry in value.items() if key != "extends"})
+        value = value.get("extends")
     if value is None or value.data is None:
-        return None, files.roots_of(tree)
+        return None, changes, files.roots_of(changes or tree)
     if typed is not None and not is_name(str(value.data)):
         # Named by the user, so the file itself is beyond question; what it refers to is not.
         path = Path(typed)
@@ -168,19 +183,39 @@ def _scene(tree: Value, files: Files, typed: str | Path | None) -> tuple[Path | 
             found = None
     else:
         found = files.locate(value, shipped_scenes(), "scene")
-    return found or (None, files.roots_of(value))
+    file, roots = found or (None, files.roots_of(value))
+    if changes is not None:  # what they name is beside the file that they stand in
+        roots = Roots(tuple(dict.fromkeys((*roots.folders, *files.roots_of(changes).folders))))
+    return file, changes, roots
 
 
 def _with_scene(tree: Value, found: Path | None, document: Document) -> Value:
-    """Write the scene relative to the folder of the resolved file, if it is inside."""
+    """Write the scene, and the files that its changes name, relative to the folder of the resolved file."""
     value = tree.get("scene")
-    if value is None or found is None or is_name(str(value.data)):
+    if value is None:
         return tree
     home = (document.path.parent if document.path else Path()).resolve()
-    path = found.resolve()
-    text = os.path.relpath(path, home) if path.is_relative_to(home) else str(path)
-    text = text if not is_name(text) else f"./{text}"
-    return tree.updated({"scene": value.with_data(text)})
+
+    def spelled(path: Path) -> str:
+        text = os.path.relpath(path, home) if path.is_relative_to(home) else str(path)
+        return text if not is_name(text) else f"./{text}"
+
+    def moved(value: Value, key: str) -> Value:
+        if isinstance(value.data, dict):
+            return value.with_data({name: moved(entry, name) for name, entry in value.data.items()})
+        is_file = key == "file" or key.endswith("_texture")
+        if not is_file or not isinstance(value.data, str) or is_name(value.data) or value.source.path == document.path:
+            return value
+        return value.with_data(spelled(((value.source.path or Path("x")).parent / value.data).resolve()))
+
+    if isinstance(value.data, dict):
+        value, base = moved(value, ""), value.get("extends")
+        if base is not None and found is not None and not is_name(str(base.data)):
+            value = value.updated({"extends": base.with_data(spelled(found.resolve()))})
+        return tree.updated({"scene": value})
+    if found is None or is_name(str(value.data)):
+        return tree
+    return tree.updated({"scene": value.with_data(spelled(found.resolve()))})
 
 
 def _with_plugins(tree: Value, files: Files) -> Value:

@@ -8,7 +8,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from rendergraph.document import Source, Value, from_plain, parse, shown
+from rendergraph.document import Source, Value, from_plain, merge_patch, parse, shown
 from rendergraph.errors import InputError, Option, Place, Problem, UsageError, nearest, suggestion
 from rendergraph.read import entries, word
 
@@ -27,17 +27,11 @@ NamesOf = Callable[[Value], TypeNames | None]
 """From the value of `type` to what it takes, None where there is no such type."""
 
 
-def merge_patch(target: Value | None, patch: Value) -> Value:
-    """RFC 7386: mappings merge, null removes, everything else replaces; each value keeps its own place."""
-    if not isinstance(patch.data, dict):
-        return patch
-    merged = dict(target.mapping) if target is not None else {}
-    for key, value in patch.data.items():
-        if value.data is None:
-            merged.pop(key, None)
-        else:
-            merged[key] = merge_patch(merged.get(key), value)
-    return patch.with_data(merged)
+def merge_scene(target: Value | None, patch: Value) -> Value:
+    """Merge a pipeline's changes to its scene, which keep their nulls: they remove from a file that is read later."""
+    if isinstance(patch.data, dict) and target is not None and isinstance(target.data, str):
+        target = target.with_data({"extends": target})
+    return merge_patch(target, patch, keep_nulls=True)
 
 
 def diff(old: Any, new: Any) -> Any:
@@ -88,6 +82,8 @@ def merge_pipeline(target: Value, patch: Value, names_of: NamesOf) -> tuple[Valu
     if (nodes := target.get("nodes")) is not None:
         target = target.updated({"nodes": nodes.with_data(kept)})
     merged = merge_patch(target, patch)
+    if (scene := patch.get("scene")) is not None and scene.data is not None:
+        merged = merged.updated({"scene": merge_scene(target.get("scene"), scene)})
     # Merging takes a null away, but beside a group it still has to say that this one member is not connected.
     for name, links in disconnected.items():
         present = merged.get("nodes", name, "inputs")
@@ -158,7 +154,7 @@ _NODE_KEYS: dict[str, tuple[Any, str]] = {
     "enabled": (bool | None, "true or false"),
 }
 _ID = "[A-Za-z_][A-Za-z0-9_-]*"
-_PATH = rf"((?:{_ID}/)*)(?:({_ID})\.)?({_ID})\Z"
+_PATH = rf"((?:{_ID}/)*)(?:({_ID})\.)?({_ID})\Z|(?P<scene>scene)\.(?P<keys>[^./]+(?:\.[^./]+)+)\Z"
 
 
 class Setting(Struct, frozen=True):
@@ -194,8 +190,8 @@ def settings(sets: Sequence[str] | Mapping[str, object]) -> list[Setting]:
             except InputError as error:
                 problems += [problem.relocate(Place(source.origin), code="RG120") for problem in error.problems]
             else:
-                scope = tuple(match[1].split("/")[:-1])
-                found.append(Setting(scope, match[2], match[3], value, path))
+                scope = tuple((match[1] or "").split("/")[:-1])
+                found.append(Setting(scope, match["scene"] or match[2], match["keys"] or match[3], value, path))
     if problems:
         raise UsageError(problems)
     return found
@@ -231,7 +227,9 @@ def patch_of(tree: Value, wanted: Sequence[Setting], names_of: NamesOf) -> tuple
     parameters = entries(tree, "parameters")
     known = []
     for setting in wanted:
-        if setting.node is None:
+        if setting.node == "scene" and "scene" not in nodes:
+            _put(root, setting.value, "scene", *setting.name.split("."))
+        elif setting.node is None:
             if setting.name in parameters:
                 _put(root, setting.value, "parameters", setting.name, "default")
             else:

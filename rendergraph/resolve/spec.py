@@ -137,6 +137,8 @@ class PipelineSpec(Struct, frozen=True, eq=False):
     """A pipeline with `extends`, patches, settings, parameters and sub-pipelines applied.
 
     Attributes:
+        scene: the scene's file, if there is one.
+        scene_changes: the mapping of the pipeline that is merged into the scene, or is the scene.
         roots: where the scene may read from; `roots.check(path, place)`.
         scopes: sub-pipelines by scope (`glow/`).
         tree: the resolved file, sub-pipelines in place of their names.
@@ -151,6 +153,7 @@ class PipelineSpec(Struct, frozen=True, eq=False):
     description: str
     size: tuple[int, int]
     scene: Path | None
+    scene_changes: Value | None
     roots: Roots
     nodes: Mapping[str, NodeSpec]
     outputs: Mapping[str, Value]

@@ -7,7 +7,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from rendergraph.declare import NO_EXTENSIONS, Extensions
-from rendergraph.document import shown
+from rendergraph.document import Value, shown
 from rendergraph.errors import Place, Problem
 from rendergraph.scene.mesh_files import MESHES, read_mesh
 from rendergraph.scene.model import Scene, SceneLimits
@@ -17,8 +17,9 @@ EXTENSIONS = (".yaml", ".yml", *MESHES)
 
 
 def load(
-    path: Path,
+    path: Path | None,
     *,
+    changes: Value | None = None,
     check_path: CheckPath | None = None,
     limits: SceneLimits = SceneLimits(),
     extensions: Extensions = NO_EXTENSIONS,
@@ -27,16 +28,17 @@ def load(
 
     The scene is as the file has it: `animate.complete` adds a camera and a light if there are none. What a reader left
     out, replaced or clamped is in `warnings`. `check_path` is the root rule for every path in the file; by default
-    paths stay under the file's own folder, links followed.
+    paths stay under the file's own folder, links followed. `changes`, with the keys of scene files, are merged into
+    the scene; without a file they are the scene.
     """
-    reading = Reading(path, check_path or inside(path.parent), limits, extensions)
-    suffix = path.suffix.lower()
-    if suffix in EXTENSIONS:
+    reading = Reading(path or Path("scene.yaml"), check_path or inside((path or Path("x")).parent), limits, extensions)
+    suffix = path.suffix.lower() if path is not None else ""
+    if path is not None and suffix in EXTENSIONS:
         reading.check_file(path, "scene file")
-    if suffix in (".yaml", ".yml"):
+    if path is None or changes is not None or suffix in (".yaml", ".yml"):
         from rendergraph.scene.scene_file import read_scene  # the largest of the readers
 
-        scene = read_scene(path, reading)
+        scene = read_scene(path, reading, changes)
     else:
         unknown = Problem("RG303", f"'{shown(path.name)}' is not a scene; a scene ends in", Place(str(path)))
         scene = read_mesh(path, reading, unknown, EXTENSIONS)

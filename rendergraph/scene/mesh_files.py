@@ -54,7 +54,7 @@ def _read_plugin_mesh(path: Path, loader: Added[MeshLoader], reading: Reading) -
     for number, part in enumerate(parts):
         name = names.unique(str(part.name), path.stem)
         try:
-            mesh = _mesh(name, part)
+            mesh = check_mesh(part, name)
             r, g, b = (_factor("base_color", value) for value in part.base_color)
             metallic, roughness = _factor("metallic", part.metallic), _factor("roughness", part.roughness)
         except (ValueError, TypeError, OverflowError) as error:
@@ -73,8 +73,8 @@ def _unusable(loader: Added[MeshLoader], what: str, text: str) -> InputError:
     return InputError(Problem("RG498", text, Place(shown_file(loader.file))))
 
 
-def _mesh(name: str, part: MeshData) -> Mesh:
-    """A loader's mesh; a mistake is a ValueError whose text begins with the attribute's name."""
+def check_mesh(part: MeshData, name: str = "") -> Mesh:
+    """Return the mesh of arrays; a mistake is a ValueError whose text begins with the attribute's name."""
     arrays = {key: _floats(key, getattr(part, key)) for key in _WIDTHS}
     positions = arrays.pop("positions")
     if positions is None or not len(positions):

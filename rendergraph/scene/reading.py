@@ -6,16 +6,20 @@ before anything is opened; only regular files are read, and only up to a limit.
 
 from __future__ import annotations
 
+import io
 import re
 import stat
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
+import numpy as np
+import numpy.typing as npt
 from msgspec import Struct, field
 from msgspec.structs import replace
 
-from rendergraph.declare import NO_EXTENSIONS, READ_IMAGES, Extensions
+from rendergraph.declare import NO_EXTENSIONS, READ_IMAGES, Added, Extensions
+from rendergraph.declare.extensions import ImageLoader
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.scene.model import ImageSource, Material, Mesh, SceneLimits
@@ -160,7 +164,11 @@ class Reading(Struct):
         if path not in self._images:
             record_read(path)
             source = ImageSource(path, None, shown(path.name))
-            loader = None if path.suffix.lower() in ("", *READ_IMAGES) else self.extensions.image_loader(path.suffix)
+            loader: Added[ImageLoader] | None = None
+            if path.suffix.lower() == ".npy":
+                loader = Added(".npy", _read_npy, "rendergraph", path)
+            elif path.suffix.lower() not in ("", *READ_IMAGES):
+                loader = self.extensions.image_loader(path.suffix)
             if loader is None:
                 source = self._checked(source, f"{what} '{self._name(path)}'", line)
             elif (kind := file_kind(path)) != "file":
@@ -183,6 +191,12 @@ class Reading(Struct):
         except ImageError as error:
             raise self.error(error.code, f"{what} {error.reason}", line=line) from None
         return replace(source, size=size, channels=channels)
+
+
+def _read_npy(data: bytes) -> npt.NDArray[Any]:
+    """Return the array of an image in NumPy's own format."""
+    found: npt.NDArray[Any] = np.load(io.BytesIO(data), allow_pickle=False)
+    return found
 
 
 def file_kind(path: Path) -> Literal["file", "missing", "other", "unreadable"]:

@@ -196,7 +196,7 @@ def read_columns(data: bytes, ending: str, section: str, most: int, most_bytes: 
         except (msgspec.DecodeError, RecursionError) as error:
             raise ValueError(f"is not a mapping of keys to lists: {error}") from None
     elif ending == ".npz":
-        given = _arrays(data, most_bytes)
+        given = read_arrays(data, most_bytes)
     else:
         raise ValueError("is no table of copies; use a file that ends in .csv, .json or .npz")
     known = COLUMNS[section]
@@ -259,7 +259,8 @@ def _csv_columns(data: bytes, section: str, most: int) -> dict[str, Any]:
     return found
 
 
-def _arrays(data: bytes, most_bytes: int) -> dict[str, Any]:
+def read_arrays(data: bytes, most_bytes: int) -> dict[str, Any]:
+    """Return the arrays of an `.npz` file that unpacks to at most so many bytes; a mistake is a ValueError."""
     import zipfile  # for such files alone
     import zlib  # as zipfile
 

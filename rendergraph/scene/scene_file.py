@@ -17,11 +17,12 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from rendergraph.declare import Section, TextureKind
-from rendergraph.document import Value, load, shown
-from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.document import Source, Value, from_plain, load, merge_patch, shown
+from rendergraph.errors import InputError, Option, Problem, suggestion
 from rendergraph.facts import NO_EXTRA, Extra
 from rendergraph.keys import Key, MapOf, Validator, plain
 from rendergraph.keys.values import FILE
+from rendergraph.resources import is_name, shipped_scenes
 from rendergraph.scene import animate, scene_keys, scene_values
 from rendergraph.scene.environments import SKIES, named
 from rendergraph.scene.geometry import rigid
@@ -41,7 +42,7 @@ from rendergraph.scene.model import (
     Scene,
     Texture,
 )
-from rendergraph.scene.reading import Reading
+from rendergraph.scene.reading import Reading, inside
 from rendergraph.scene.repeat import Copies, copies, count_of, read_columns
 from rendergraph.scene.shapes import SHAPES, ShapePart, build
 from rendergraph.scene.textures import TEXTURES as SHIPPED_TEXTURES
@@ -51,18 +52,62 @@ if TYPE_CHECKING:
     from rendergraph.scene.rig import Rig
 
 _DEFAULT = Material("default", base_color=(0.8, 0.8, 0.8, 1.0))
+SECTION_NAMES = ("objects", "materials", "lights", "cameras")
+SECTION_NAMES = ("objects", "materials", "lights", "cameras")
 _GENERATED = ("base_color", "normal", "metallic_roughness", "occlusion")
 _SRGB = ("base_color", "emissive", "specular_color", "sheen_color")
 
 
-def read_scene(path: Path, reading: Reading) -> Scene:
-    """Read a scene file; the error has every mistake in it, or the first of a mesh file it names."""
-    document = load(path, limits=reading.limits.yaml, keep_going=True)
-    reader = _Reader(path, reading, Validator(scene_keys.CODES, document.problems))
-    scene = reader.read(document.root)
+def read_scene(path: Path | None, reading: Reading, changes: Value | None = None) -> Scene:
+    """Read a scene file with what it extends, and changes; the error has every mistake, or the first of a mesh file."""
+    validator = Validator(scene_keys.CODES)
+    root = Value({}, Source("scene")) if path is None else _extended(path, reading, validator, ())
+    if changes is not None:
+        whole = merge_patch(root, changes)
+        _check_names(root, changes, whole, validator)
+        root = whole
+        root = root.updated({"scene": Value(1, root.source)}) if "scene" not in root.mapping else root
+    reader = _Reader(reading.path, reading, Validator(scene_keys.CODES, validator.problems))
+    scene = reader.read(root)
     if reader.validator.problems:
         raise InputError(sorted(reader.validator.problems, key=_by_place))
     return scene
+
+
+def _extended(path: Path, reading: Reading, validator: Validator, before: tuple[Path, ...]) -> Value:
+    """Return the values of a scene file, merged into those of the file that it extends."""
+    if path.suffix.lower() in MESHES:
+        source = Source(Option("scene"))
+        return from_plain({"objects": {path.stem: {"file": path.resolve(), "animation": {}}}}, source)
+    document = load(path, limits=reading.limits.yaml, keep_going=True)
+    validator.problems += document.problems
+    root, base = document.root, document.root.get("extends")
+    if base is None or not isinstance(base.data, str):
+        return root
+    shipped = shipped_scenes()
+    if is_name(base.data) and base.data not in shipped:
+        text = f"there is no shipped scene '{base.data}'{suggestion(base.data, shipped, most=20)}"
+        raise InputError([*validator.problems, base.problem("RG015", text)])
+    found = shipped.get(base.data) or reading.resolve(base.data, line=base.line, file=path)
+    reading.check_file(found, "scene file")
+    if found in (path, *before):
+        names = " → ".join(file.name for file in (*before, path, found))
+        raise InputError([*validator.problems, base.problem("RG118", f"the file extends itself: {names}")])
+    own = root.with_data({key: value for key, value in root.items() if key != "extends"})
+    return merge_patch(_extended(found, reading, validator, (*before, path)), own)
+
+
+def _check_names(root: Value, changes: Value, whole: Value, validator: Validator) -> None:
+    """Report settings such as `scene.lights.sn.color` of what the scene has not, and take them out of the whole."""
+    for section in SECTION_NAMES:
+        known = _entries(root, section)
+        for name, entry in _entries(changes, section).items():
+            option = entry.source.origin
+            if name not in known and isinstance(option, Option) and option.path.count(".") > 2:
+                hint = suggestion(str(name), known) or f"; the scene has no {section}"
+                text = f"there is no {section.removesuffix('s')} '{shown(name)}'{hint}"
+                validator.report(entry, "RG322", text)
+                del whole.mapping[section].mapping[name]
 
 
 def _by_place(problem: Problem) -> tuple[bool, str, int, int]:
@@ -105,8 +150,7 @@ class _Reader:
 
     def read(self, root: Value) -> Scene:
         """The scene; only to be used if no problem was found."""
-        sections = ("objects", "materials", "lights", "cameras")
-        self.names = names = {section: tuple(_entries(root, section)) for section in sections}
+        self.names = names = {section: tuple(_entries(root, section)) for section in SECTION_NAMES}
         self._add_plugin_keys(root)
         top = self.validator.file(root, self.table, "`scene: 1` and `objects`")
         if top is None:
@@ -165,10 +209,10 @@ class _Reader:
     def _opened(self, section: str, entry: Value, added: dict[str, Any]) -> dict[str, Any]:
         for key in self.sections[section].keys:
             if key.name in added and key.type is FILE:
-                place, file = _value(entry, key.name), added.pop(key.name)
+                place = _value(entry, key.name)
+                del added[key.name]
                 with self._reading_file(place):
-                    image = self.reading.image(self.reading.resolve(file, line=place.line), "image", line=place.line)
-                    added[key.name] = image
+                    added[key.name] = self._image(place)
         return added
 
     def _check_name(self, entry: Value, key: str, known: Iterable[str], section: str) -> None:
@@ -188,7 +232,8 @@ class _Reader:
             yield
         except InputError as error:
             for problem in error.problems:
-                is_here = problem.place is None or problem.place.file == str(self.path)
+                here = str(self.path), str(place.source.path)
+                is_here = problem.place is None or problem.place.file in here
                 self.validator.problems.append(place.relocate(problem) if is_here else problem)
 
     def _over(self, entry: Value, what: str, limit: str) -> InputError:
@@ -206,8 +251,7 @@ class _Reader:
                     textures |= {slot: self._generated(slot, file)} if "kind" in file else {}
                     continue
                 with self._reading_file(place):
-                    image = self.reading.image(self.reading.resolve(file, line=place.line), "image", line=place.line)
-                    textures[slot] = Texture(image, slot in _SRGB)
+                    textures[slot] = Texture(self._image(place), slot in _SRGB)
         self.recipe["materials", name] = values
         self.material_numbers[name] = len(self.materials)
         self.materials.append(scene_values.material(name, values, textures))
@@ -253,7 +297,7 @@ class _Reader:
         columns: dict[str, Any] = {}
         if "file" in repeat:
             with self._reading_file(_value(place, "file")):
-                columns = self._columns(section, repeat["file"], _value(place, "file"), most)
+                columns = self._columns(section, _value(place, "file"), most)
         with self._reading_file(place):
             count = len(next(iter(columns.values()))) if columns else count_of(repeat)
             if count > most:
@@ -262,13 +306,13 @@ class _Reader:
         self.copies[section, name] = found
         return found
 
-    def _columns(self, section: str, file: str, place: Value, most: int) -> dict[str, Any]:
-        path = self.reading.resolve(file, line=place.line)
+    def _columns(self, section: str, place: Value, most: int) -> dict[str, Any]:
+        path = self._resolve(place)
         data = self.reading.read(path, "file of copies")
         try:
             return read_columns(data, path.suffix.lower(), section, most, self.reading.limits.memory_bytes)
         except ValueError as problem:
-            raise InputError(place.problem("RG321", f"'{shown(file)}' {problem}")) from None
+            raise InputError(place.problem("RG321", f"'{shown(place.data)}' {problem}")) from None
 
     def _camera(self, name: str, entry: Value) -> None:
         self.recipe["cameras", name] = values = self._plain("cameras", entry)
@@ -296,7 +340,7 @@ class _Reader:
         with self._reading_file(place):
             environment = named(file, self.lights, values)
             if environment is None:
-                image = self.reading.image(self.reading.resolve(file, line=place.line), "image", line=place.line)
+                image = self._image(place)
                 environment = Environment(image, image.size)
             turn = math.radians(values.get("rotate_degrees", 0.0))
             return replace(environment, intensity=values.get("intensity", 1.0), rotate=turn)
@@ -424,8 +468,20 @@ class _Reader:
             self.cameras[camera_name] = replace(camera, name=camera_name, transform=rigid(world @ camera.transform))
         self.placements[name] = Placement(tuple(objects), tuple(lights), tuple(cameras))
 
+    def _resolve(self, place: Value) -> Path:
+        """Return the path that is written at a place; one that the user typed may lead anywhere."""
+        source, file = place.source, str(place.data)
+        if isinstance(source.origin, Option):
+            return Path(file).resolve()
+        if source.path is not None and source.path in shipped_scenes().values():
+            return inside(source.path.parent)(source.path.parent / file, place.place)
+        return self.reading.resolve(file, line=place.line, file=source.path or Path("x"))
+
+    def _image(self, place: Value) -> ImageSource:
+        return self.reading.image(self._resolve(place), "image", line=place.line)
+
     def _read_file(self, name: str, file: str, entry: Value) -> _File:
-        path = self.reading.resolve(file, line=_value(entry, "file").line)
+        path = self._resolve(_value(entry, "file"))
         if path not in self.mesh_files:
             if path.suffix.lower() in MESHES:
                 self.reading.check_file(path, "file")
@@ -454,6 +510,8 @@ class _Reader:
         values: dict[str, Any] = {"clip": next(iter(clips), None), **plain(place, scene_keys.ANIMATION)}
         if values["clip"] in clips:
             return values
+        if not clips and not place.mapping:
+            return None
         what = f"no clip '{shown(values['clip'])}'" if values["clip"] else "no clips"
         text = f"object '{shown(name)}': its file has {what}{suggestion(values['clip'] or '', clips)}"
         self.validator.report(place.get("clip") or place, "RG322", text)

@@ -11,7 +11,22 @@ from msgspec.structs import replace
 from rendergraph.declare import Extensions, Section, TextureKind
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.keys import Codes, Key, MapOf, Recursive, Table, schema
-from rendergraph.keys.values import FILE, TEXT, choice, color, listed, number, row, scale, vector, version, whole, word
+from rendergraph.keys.values import (
+    FILE,
+    TEXT,
+    choice,
+    color,
+    listed,
+    number,
+    row,
+    scale,
+    shipped,
+    vector,
+    version,
+    whole,
+    word,
+)
+from rendergraph.resources import shipped_scenes
 from rendergraph.scene.shapes import LENGTH, SHAPES
 from rendergraph.scene.textures import TEXTURES as TEXTURE_KINDS
 from rendergraph.typecheck import Brief, JsonSchema, Schema, is_numeric
@@ -328,6 +343,9 @@ def scene_table(sections: Mapping[str, Table] = SECTIONS) -> Table:
         "a scene file",
         (
             Key("scene", version(1), "Version of the format.", required=True, example="scene: 1"),
+            Key(
+                "extends", shipped(shipped_scenes), "A shipped scene or a scene file; the rest is a merge patch on it."
+            ),
             Key("description", TEXT, "What the scene shows."),
             Key("objects", MapOf(sections["objects"]), "Shapes and files, by name."),
             Key("materials", MapOf(sections["materials"]), "Surfaces, by name."),

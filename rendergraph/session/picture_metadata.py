@@ -26,8 +26,10 @@ PICTURES = frozenset({".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga"})
 _MOST_FRAMES = 10**9
 
 
-def is_picture(name: str | Path) -> bool:
+def is_picture(name: object) -> bool:
     """Return whether the extension is that of a picture."""
+    if not isinstance(name, str | Path) or "\n" in str(name):
+        return False
     return Path(name).suffix.lower() in PICTURES
 
 

@@ -11,13 +11,17 @@ from typing import TYPE_CHECKING, Any, TypeVar, Unpack
 
 from msgspec import structs
 
+from rendergraph.catalog import Catalog, find
+from rendergraph.catalog.catalog import own_classes
+from rendergraph.document import shown
 from rendergraph.session import stages
 from rendergraph.session.progress import report_progress
 from rendergraph.session.selection import RenderKeywords, RenderOptions, Selection, each_of
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
+
     from rendergraph.allocate import ResourcePlan
-    from rendergraph.catalog import Catalog
     from rendergraph.session.frame import Frame
     from rendergraph.session.gpu import Gpu
     from rendergraph.session.progress import Progress
@@ -27,10 +31,10 @@ T = TypeVar("T")
 
 
 def load(
-    source: str | Path,
+    source: str | Path | Mapping[str, Any],
     *,
-    scene: str | Path | None = None,
-    environment: str | Path | None = None,
+    scene: str | Path | Mapping[str, Any] | None = None,
+    environment: str | Path | npt.NDArray[Any] | None = None,
     camera: str | None = None,
     size: tuple[int, int] | None = None,
     sets: Sequence[str] = (),
@@ -39,31 +43,41 @@ def load(
     limits: Mapping[str, int] | None = None,
     plugins: Sequence[str | Path] = (),
 ) -> Pipeline:
-    """Return a pipeline by shipped name or file; it is read when it is first needed.
+    """Return a pipeline by shipped name or file, or of a mapping with the keys of a file; it is read when first needed.
 
-    The arguments are the fields of `Selection`.
+    The other arguments are the fields of `Selection`; a scene may be a mapping, too, such as a `Scene`.
 
     Raises:
         UsageError: an unknown limit, or a size that is not a pair of whole numbers.
     """
-    return Pipeline(
+    pipeline = Pipeline(
         Selection(
-            source=str(source),
-            scene=None if scene is None else str(scene),
-            environment=None if environment is None else Path(environment),
+            source=source if isinstance(source, Mapping) else str(source),
             camera=camera,
             size=size,
             sets=each_of(sets),
-            patches=tuple(Path(p) if isinstance(p, str) else p for p in patches),
             asset_roots=tuple(Path(root) for root in asset_roots),
             limits=tuple((limits or {}).items()),
             plugins=tuple(Path(plugin) for plugin in plugins),
         )
     )
+    if isinstance(source, Mapping):
+        pipeline, plain = pipeline._with_values(source)
+        pipeline = pipeline.select(source=plain)
+    pipeline = pipeline if scene is None else pipeline.with_scene(scene)
+    pipeline = pipeline if environment is None else pipeline.with_environment(environment)
+    for patch in patches:
+        pipeline = pipeline.patch(patch)
+    return pipeline
 
 
-def as_pipeline(pipeline: Pipeline | str | Path) -> Pipeline:
-    """Return the pipeline, or the one with that name or file."""
+def loads(text: str, **fields: Any) -> Pipeline:
+    """Return the pipeline in a YAML text; what it names is relative to the current folder. `fields` as in `load`."""
+    return load(text if "\n" in text else f"{text}\n", **fields)
+
+
+def as_pipeline(pipeline: Pipeline | str | Path | Mapping[str, Any]) -> Pipeline:
+    """Return the pipeline, or the one with that name, file or content."""
     return pipeline if isinstance(pipeline, Pipeline) else load(pipeline)
 
 
@@ -97,23 +111,80 @@ class Pipeline:
 
     def __repr__(self) -> str:
         said = ((each, getattr(self.selection, each.name)) for each in structs.fields(self.selection)[1:])
-        given = "".join(f", {each.name}={value!r}" for each, value in said if value != each.default)
-        return f"load({self.selection.source!r}{given})"
+        given = "".join(f", {each.name}={shown(repr(value))}" for each, value in said if value != each.default)
+        return f"load({self.selection.label!r}{given})"
+
+    @property
+    def travels(self) -> bool:
+        """Whether other processes can render it, which lack the node classes of this one."""
+        return self.catalog is None and not own_classes()
 
     # Changing --------------------------------------------------------------------------------------------------------
 
-    def set(self, path: str, value: object) -> Pipeline:
-        """Return a copy with one value changed, `ao.radius` or a pipeline parameter's name, as with `-s`."""
-        text = value if isinstance(value, str) else json.dumps(value, default=lambda found: found.tolist())  # NumPy's
-        return self.select(sets=(*self.selection.sets, f"{path}={text}"))
+    def set(self, path: str | Mapping[str, object], value: object = None) -> Pipeline:
+        """Return a copy with one value changed, or several, as with `-s`: `set("ao.radius", 0.5)`.
+
+        Args:
+            path: `ao.radius`, the name of a pipeline parameter, `scene.lights.sun.intensity`; or a mapping of paths.
+            value: a value as in a file; an array for an input, a node class or shader text for a type.
+        """
+        changed = self
+        for name, one in ({path: value} if isinstance(path, str) else path).items():
+            node, _, key = name.rpartition(".")
+            kind = "type" if key == "type" else "inputs" if getattr(one, "ndim", 0) > 1 else "params"
+            keys = name.split(".") if node.startswith("scene.") else ("nodes", node, kind, key)
+            changed, plain = changed._with_values(one, *(keys[:3] if kind == "type" else keys))
+            text = plain if isinstance(plain, str) else json.dumps(plain)
+            changed = changed.select(sets=(*changed.selection.sets, f"{name}={text}"))
+        return changed
 
     def patch(self, patch: str | Path | Mapping[str, Any]) -> Pipeline:
-        """Return a copy with a merge patch applied (RFC 7386)."""
-        return self.select(patches=(*self.selection.patches, Path(patch) if isinstance(patch, str) else patch))
+        """Return a copy with a merge patch applied (RFC 7386): a file, or values in Python."""
+        changed, plain = self._with_values(patch) if isinstance(patch, Mapping) else (self, Path(patch))
+        return changed.select(patches=(*changed.selection.patches, plain))
 
-    def with_scene(self, scene: str | Path) -> Pipeline:
-        """Return a copy with another scene."""
+    def with_scene(self, scene: str | Path | Mapping[str, Any]) -> Pipeline:
+        """Return a copy with another scene: a name, a file, or a `Scene` or other mapping with a scene file's keys."""
+        if isinstance(scene, Mapping):
+            return self.select(scene=None).patch({"scene": None}).patch({"scene": scene})
         return self.select(scene=str(scene))
+
+    def with_camera(self, name: str | None = None, **keys: Any) -> Pipeline:
+        """Return a copy seen from a camera of the scene, or from a new one: `with_camera(eye=(0, 1, 4), target=…)`.
+
+        Args:
+            name: of the scene's camera.
+            keys: as in scene files: `eye`, `target`, `up`, `fov_y_degrees`, `height`, `near`, `far`, …
+        """
+        if keys:
+            name = name or "custom"
+            return self.set(f"scene.cameras.{name}", keys).select(camera=name)
+        return self.select(camera=name)
+
+    def with_environment(self, environment: str | Path | npt.NDArray[Any]) -> Pipeline:
+        """Return a copy with another environment: a shipped name, a file, or an array (height, width, 3) of light."""
+        changed, plain = self._with_values(environment, "environment")
+        return changed.select(environment=Path(plain))
+
+    def _with_values(self, value: Any, *keys: str) -> tuple[Pipeline, Any]:
+        """Return a Python value as plain data, and a copy with the files, types and nodes that it stands for."""
+        if isinstance(value, str | int | float) and "type" not in keys:
+            return self, value
+        from rendergraph.session.python_values import Values  # most values are plain
+
+        values = Values()
+        plain, selection, catalog = values.plain(value, *keys), self.selection, self.catalog
+        if values.types:
+            catalog = (catalog or Catalog.discover(selection.plugins)).with_classes(values.types)
+        if values.shaders and catalog is not None:
+            catalog = catalog.with_shaders((name, find.shader(file)) for name, file in values.shaders.items())
+        selection = structs.replace(
+            selection,
+            asset_roots=tuple(dict.fromkeys((*selection.asset_roots, *values.folders))),
+            plugins=tuple(dict.fromkeys((*selection.plugins, *values.shaders.values()))),
+            patches=(*selection.patches, *({"nodes": {name: node}} for name, node in values.nodes.items())),
+        )
+        return replace(self, selection=selection, catalog=catalog), plain
 
     def with_size(self, size: tuple[int, int]) -> Pipeline:
         """Return a copy with another size."""

@@ -12,6 +12,7 @@ from msgspec.structs import replace
 from rendergraph import stamps
 from rendergraph.declare import Extensions
 from rendergraph.document import YamlLimits
+from rendergraph.resolve.spec import flow
 from rendergraph.scene.animate import complete
 from rendergraph.scene.environments import named
 from rendergraph.scene.load import load
@@ -27,8 +28,10 @@ def scene_of(resolved: Resolved) -> Scene:
     """Return the scene, with at least a camera and a light."""
     selection, spec, extensions = resolved.selection, resolved.spec, resolved.catalog.extensions
     limits = scene_limits(selection)
-    roots = spec.roots.folders if spec.scene is not None else ()
-    key = (Path.cwd(), spec.scene, selection.environment, selection.camera, roots, limits, selection.plugins)
+    changes = spec.scene_changes
+    roots = spec.roots.folders if spec.scene is not None or changes is not None else ()
+    key: tuple[Any, ...] = (Path.cwd(), spec.scene, selection.environment, selection.camera, roots, limits)
+    key = (*key, selection.plugins, changes and (spec.path, flow(changes)))
     # One camera serves pictures of about one shape, such as a viewer's smaller ones.
     shape = max(math.floor(10 * spec.size[0] / spec.size[1] + 0.1), 1) / 10
     found = _IN_USE.get(key) or _IN_USE.get((*key, shape))
@@ -36,8 +39,9 @@ def scene_of(resolved: Resolved) -> Scene:
         return found
     with stamps.track_reads() as files:
         scene = Scene("empty")
-        if spec.scene is not None:
-            scene = load(spec.scene, check_path=spec.roots.check, limits=limits, extensions=extensions)
+        if spec.scene is not None or changes is not None:
+            check = spec.roots.check
+            scene = load(spec.scene, changes=changes, check_path=check, limits=limits, extensions=extensions)
         bare = selection.environment == Path("none")
         if bare:
             scene = replace(scene, environment=None)

@@ -29,7 +29,7 @@ class Selection(Struct, frozen=True):
     """A pipeline's name with everything that changes it, as the options of every verb have it.
 
     Attributes:
-        source: a shipped name (`forward`) or a path.
+        source: a shipped name (`forward`), a path, YAML text of several lines, or a mapping with the keys of a file.
         scene, size: override the file's; `size` is width and height in pixels.
         environment: an equirectangular image that replaces the scene's.
         camera: name of the scene's camera; its first by default.
@@ -41,7 +41,7 @@ class Selection(Struct, frozen=True):
         plugins: Python files or folders with node types.
     """
 
-    source: str
+    source: str | Mapping[str, Any]
     scene: str | None = None
     camera: str | None = None
     environment: Path | None = None
@@ -61,6 +61,12 @@ class Selection(Struct, frozen=True):
         for name, _ in self.limits:
             if name not in known:
                 raise UsageError(Problem("RG500", f"unknown limit '{name}'{suggestion(name, known)}"))
+
+    @property
+    def label(self) -> str:
+        """The source in one line."""
+        is_name = isinstance(self.source, str) and "\n" not in self.source
+        return str(self.source) if is_name else "pipeline"
 
     def allowed(self, kind: str) -> dict[str, int]:
         """Return the limits set for `yaml` or `scene` files, or for the `plan`, by field."""

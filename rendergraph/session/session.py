@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Unpack
+from typing import Any, Unpack
 
 from rendergraph.session import stages
 from rendergraph.session.drawing import Drawing
@@ -26,7 +26,7 @@ class Session(Gpu):
 
     def render(
         self,
-        pipeline: Pipeline | str | Path,
+        pipeline: Pipeline | str | Path | Mapping[str, Any],
         size: tuple[int, int] | None = None,
         *,
         progress: Progress | bool | None = None,
@@ -36,12 +36,17 @@ class Session(Gpu):
         return as_pipeline(pipeline).render(size, session=self, progress=progress, **options)
 
     def frames(
-        self, pipeline: Pipeline | str | Path, size: tuple[int, int] | None = None, **options: Unpack[RenderKeywords]
+        self,
+        pipeline: Pipeline | str | Path | Mapping[str, Any],
+        size: tuple[int, int] | None = None,
+        **options: Unpack[RenderKeywords],
     ) -> Iterator[Frame]:
         """Render a pipeline frame by frame; see `Pipeline.frames`."""
         return as_pipeline(pipeline).frames(size, session=self, **options)
 
-    def compile(self, pipeline: Pipeline | str | Path, **options: Unpack[RenderKeywords]) -> Drawing:
+    def compile(
+        self, pipeline: Pipeline | str | Path | Mapping[str, Any], **options: Unpack[RenderKeywords]
+    ) -> Drawing:
         """Compile a pipeline without rendering it; a cached executable is used again if only uniforms differ.
 
         Call it, and use the result, inside `with session.current()`. Its `runner` renders the bare frame, without the

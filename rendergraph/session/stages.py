@@ -11,10 +11,10 @@ something is rendered.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import asdict, replace
 
@@ -61,10 +61,10 @@ def resolve(selection: Selection, catalog: Catalog | None = None, document: Docu
             raise InputError(Problem("RG011", text, Place(Option("--asset-root"))))
     catalog = catalog or Catalog.discover(selection.plugins)
     limits = YamlLimits(**selection.allowed("yaml"))
-    source: str | Document = document or selection.source
+    source: str | Document | Mapping[str, Any] = document or selection.source
     frames, fps = range(1, 2), 30.0
     if is_picture(selection.source):
-        picture = read_picture_metadata(Path(selection.source), limits)
+        picture = read_picture_metadata(Path(str(selection.source)), limits)
         source, frames, fps = picture.document, range(picture.frame, picture.frame + 1), picture.fps
         selection = replace(
             selection,

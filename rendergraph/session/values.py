@@ -58,7 +58,7 @@ class Resolved(Struct, frozen=True, eq=False, kw_only=True):
     fps: float = 30.0
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.selection.source}>"
+        return f"<{type(self).__name__} {self.selection.label}>"
 
 
 class Linked(Resolved, frozen=True, eq=False, kw_only=True):
@@ -83,7 +83,7 @@ class Expanded(Struct, frozen=True, eq=False):
     expansion: Expansion
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.linked.selection.source}>"
+        return f"<{type(self).__name__} {self.linked.selection.label}>"
 
     def for_frames(self, frames: range, *, warm_up: bool = True, timed: bool = False) -> Self:
         """Return the same for other frames, which changes neither steps nor plan."""

@@ -74,6 +74,6 @@ def view(
     other = None
     if against is not None:
         compared = as_pipeline(against)
-        other = Path(compared.selection.source).stem, compared.selection
+        other = Path(compared.selection.label).stem, compared.selection
     server = Server(ViewState(found.selection, Path.cwd(), against=other), RenderProcess(device), port=port)
     return Viewer(server.url, server.start(), height)

@@ -398,7 +398,7 @@ def test_a_plugins_texture(gl: rg.Session, loaders: Path, tmp_path: Path) -> Non
 
 def test_without_the_plugin_its_files_are_nothing(loaders: Path, tmp_path: Path) -> None:
     with pytest.raises(
-        InputError, match=r"RG303 'a\.tri' is not a scene; a scene ends in \.yaml, \.yml, \.obj, .*, \.glb$"
+        InputError, match=r"RG303 'a\.tri' is not a scene; a scene ends in \.yaml, \.yml, \.obj, .*, \.glb, \.npz$"
     ):
         rg.load("forward", scene=tmp_path / "a.tri").check()
     with pytest.raises(InputError, match=r"s\.yaml:3:\d+: RG303 'a\.tri' is not a mesh file; a mesh ends in \.obj"):

@@ -126,7 +126,7 @@ def test_every_value_knows_where_it_comes_from(folder: Path, toy_catalog: Catalo
     lines = [" ".join(line.split()) for line in spec.to_yaml(origins=True).splitlines()]
     assert f"depth: prepass.depth # {folder}/prepass.yaml:4" in lines
     assert "bias: 3 # --set shadows.bias=3" in lines
-    assert "size: [8, 8] # patch" in lines
+    assert "size: [8, 8] # patch.size" in lines
 
 
 def test_patches_come_in_order(folder: Path, toy_catalog: Catalog) -> None:
@@ -140,7 +140,7 @@ def test_patches_come_in_order(folder: Path, toy_catalog: Catalog) -> None:
 def test_a_wrong_patch_is_told_with_the_rest(folder: Path, toy_catalog: Catalog) -> None:
     spec = resolve(folder / "forward.yaml", catalog=toy_catalog, patches=[{"nods": {}}], sets=["nothing=1"])
     assert codes(spec) == ["RG101", "RG119"]
-    with pytest.raises(InputError, match="patch: RG101 a pipeline has no key 'nods'"):
+    with pytest.raises(InputError, match=r"patch\.nods: RG101 a pipeline has no key 'nods'"):
         spec.to_yaml()
 
 
