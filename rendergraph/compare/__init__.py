@@ -10,17 +10,11 @@ from typing import TYPE_CHECKING
 from rendergraph.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from rendergraph.compare.engine import Sweep as Sweep
-    from rendergraph.compare.engine import compare as compare
-    from rendergraph.compare.engine import compare_pictures as compare_pictures
-    from rendergraph.compare.engine import sweep as sweep
-    from rendergraph.compare.optimiser import check_search as check_search
-    from rendergraph.compare.optimiser import search as search
-    from rendergraph.compare.prepare import SweepOptions as SweepOptions
-    from rendergraph.compare.results import Comparison as Comparison
-    from rendergraph.compare.results import Result as Result
-    from rendergraph.compare.space import Axis as Axis
-    from rendergraph.compare.space import Space as Space
+    from rendergraph.compare.engine import Sweep, compare, compare_pictures, sweep
+    from rendergraph.compare.optimiser import check_search, search
+    from rendergraph.compare.prepare import SweepOptions
+    from rendergraph.compare.results import Comparison, Result
+    from rendergraph.compare.space import Axis, Space
 
 
 __getattr__, __dir__ = lazy_exports(

@@ -12,14 +12,8 @@ from msgspec.structs import replace
 
 from rendergraph.declare import WrittenPort
 from rendergraph.errors import InputError, Problem
-from rendergraph.expand.model import CAMERA as CAMERA
-from rendergraph.expand.model import SCENE_DATA as SCENE_DATA
-from rendergraph.expand.model import Expansion as Expansion
-from rendergraph.expand.model import VersionedSteps, follow_forwards
-from rendergraph.expand.model import ViewTable as ViewTable
-from rendergraph.expand.recording import define_parameters as define_parameters
-from rendergraph.expand.recording import param_uniforms as param_uniforms
-from rendergraph.expand.recording import record_all
+from rendergraph.expand.model import CAMERA, SCENE_DATA, Expansion, VersionedSteps, ViewTable, follow_forwards
+from rendergraph.expand.recording import define_parameters, param_uniforms, record_all
 from rendergraph.expand.versions import assign_versions
 from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import Read, Resource, Role, Step, Write

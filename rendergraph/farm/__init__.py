@@ -5,13 +5,15 @@ A `Worker` runs a `Task`; an `Executor` takes tasks and reports `Event`s. Result
 
 from __future__ import annotations
 
-from rendergraph.farm.tasks import Event as Event
-from rendergraph.farm.tasks import Executor as Executor
-from rendergraph.farm.tasks import Handle as Handle
-from rendergraph.farm.tasks import Serial as Serial
-from rendergraph.farm.tasks import Task as Task
-from rendergraph.farm.tasks import TaskFailed as TaskFailed
-from rendergraph.farm.tasks import TaskFinished as TaskFinished
-from rendergraph.farm.tasks import TaskOutput as TaskOutput
-from rendergraph.farm.tasks import TaskRetried as TaskRetried
-from rendergraph.farm.tasks import Worker as Worker
+from rendergraph.farm.tasks import (
+    Event,
+    Executor,
+    Handle,
+    Serial,
+    Task,
+    TaskFailed,
+    TaskFinished,
+    TaskOutput,
+    TaskRetried,
+    Worker,
+)

@@ -14,23 +14,18 @@ knows; the same for other functions, by their name.
 
 from __future__ import annotations
 
-from rendergraph.program.checks import Texts as Texts
-from rendergraph.program.checks import check_kept_text as check_kept_text
-from rendergraph.program.checks import check_scene_includes as check_scene_includes
-from rendergraph.program.checks import check_texts as check_texts
-from rendergraph.program.checks import missing as missing
-from rendergraph.program.checks import named_reads as named_reads
-from rendergraph.program.checks import ray_warnings as ray_warnings
-from rendergraph.program.checks import unfit_outputs as unfit_outputs
-from rendergraph.program.checks import unfit_sampler as unfit_sampler
-from rendergraph.program.checks import used_blocks as used_blocks
-from rendergraph.program.checks import used_names as used_names
-from rendergraph.program.text import StageText as StageText
-from rendergraph.program.text import StepTexts as StepTexts
-from rendergraph.program.text import positions_macro as positions_macro
-from rendergraph.program.text import prefix as prefix
-from rendergraph.program.text import stage_texts as stage_texts
-from rendergraph.program.text import text_key as text_key
-from rendergraph.program.unbound import unbound_block as unbound_block
-from rendergraph.program.unbound import unbound_sampler as unbound_sampler
-from rendergraph.program.unbound import unset_uniform as unset_uniform
+from rendergraph.program.checks import (
+    Texts,
+    check_kept_text,
+    check_scene_includes,
+    check_texts,
+    missing,
+    named_reads,
+    ray_warnings,
+    unfit_outputs,
+    unfit_sampler,
+    used_blocks,
+    used_names,
+)
+from rendergraph.program.text import StageText, StepTexts, positions_macro, prefix, stage_texts, text_key
+from rendergraph.program.unbound import unbound_block, unbound_sampler, unset_uniform
