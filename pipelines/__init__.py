@@ -1,1 +1,1 @@
-"""Shipped pipelines; shipped scenes in `scenes/`."""
+"""Shipped pipelines; in `scenes/` shipped scenes, and what scenes consist of: shapes, environments, mesh formats."""
