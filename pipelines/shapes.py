@@ -14,6 +14,8 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
 from msgspec.structs import replace
+from rendergraph.pipelines.architecture import arch, column, plant, vault
+from rendergraph.pipelines.meshes import cap, grid, in_metres, joined, lathe, side_mesh
 from rendergraph.pipelines.polygons import clip_ears
 
 from rendergraph.keys import Key
@@ -53,10 +55,10 @@ def build(shape: str, **values: Any) -> list[ShapePart]:
     """Build the parts of a shape; parameters that are not given have their defaults."""
     kind = SHAPES[shape]
     given = {key.name: key.default for key in kind.keys} | values
-    in_metres = given.pop("uv") == "metres"
+    measured = given.pop("uv") == "metres"
     parts = kind.make(**given)
     parts = parts if isinstance(parts, list) else [ShapePart(parts, np.eye(4))]
-    return [replace(part, mesh=_in_metres(part.mesh)) for part in parts] if in_metres else parts
+    return [replace(part, mesh=in_metres(part.mesh)) for part in parts] if measured else parts
 
 
 def mesh(shape: str, **values: Any) -> Mesh:
@@ -64,125 +66,12 @@ def mesh(shape: str, **values: Any) -> Mesh:
     return build(shape, **values)[0].mesh
 
 
-def _in_metres(found: Mesh) -> Mesh:
-    """A mesh whose texture coordinates are lengths on its surface, on average over each smooth side of it.
-
-    Around a closed side they are rounded to whole metres, so that a texture whose tile divides a metre has no seam.
-    """
-    assert found.uv0 is not None  # shapes have them
-    side = np.arange(len(found.positions))  # the least vertex of the same side
-    while True:
-        least = side[found.indices].min(axis=1)
-        before = side.copy()
-        np.minimum.at(side, found.indices, least[:, None])
-        side = side[side]
-        if (side == before).all():
-            break
-    uv = found.uv0.astype(np.float64)
-    for first in np.unique(side):
-        mine = side == first
-        corners = found.indices[mine[found.indices[:, 0]]]
-        edges = found.positions[corners[:, 1:]].astype(np.float64) - found.positions[corners[:, :1]]
-        steps = uv[corners[:, 1:]] - uv[corners[:, :1]]
-        area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-        inverse = np.linalg.pinv(steps)  # (n, 2, 2): edges = steps @ derivatives
-        lengths = np.linalg.norm(inverse @ edges, axis=-1)  # along u and along v
-        for axis in (0, 1):
-            length = float((area * lengths[:, axis]).sum() / max(area.sum(), 1e-30))
-            low, high = (found.positions[mine & (found.uv0[:, axis] == end)] for end in _ends(found.uv0[mine, axis]))
-            if len(low) == len(high) > 1 and (np.ptp(low, axis=0) > 0).any() and (low == high).all():
-                around = length * float(np.ptp(found.uv0[mine, axis]))
-                length *= max(1.0, round(around)) / around
-            uv[mine, axis] *= length
-    return replace(found, uv0=uv.astype(np.float32))
-
-
-def _ends(values: npt.NDArray[Any]) -> tuple[Any, Any]:
-    return values.min(), values.max()
-
-
-def _mesh(
-    name: str,
-    positions: npt.ArrayLike,
-    triangles: npt.ArrayLike,
-    normals: npt.ArrayLike,
-    uv: npt.ArrayLike,
-    along: npt.ArrayLike,
-) -> Mesh:
-    """A mesh from arrays whose last axis is the vector; one normal or direction of growing u may serve all vertices."""
-    points = np.asarray(positions, np.float32).reshape(-1, 3) + np.float32(0)  # no -0: equal positions have equal bits
-    shape = points.shape
-    tangents = np.ones((len(points), 4), np.float32)
-    tangents[:, :3] = np.broadcast_to(unit(along), shape) if np.ndim(along) == 1 else unit(along).reshape(shape)
-    each = np.asarray(normals, np.float32)
-    each = np.ascontiguousarray(np.broadcast_to(each, shape) if each.ndim == 1 else each.reshape(shape))
-    indices = np.asarray(triangles, np.uint32).reshape(-1, 3)
-    return Mesh(name, points, indices, each, tangents, np.asarray(uv, np.float32).reshape(-1, 2))
-
-
-def _joined(name: str, meshes: Sequence[Mesh]) -> Mesh:
-    starts = np.cumsum([0, *(len(part.positions) for part in meshes)])
-    columns = [
-        np.concatenate([getattr(part, field) for part in meshes])
-        for field in ("positions", "normals", "tangents", "uv0")
-    ]
-    indices = np.concatenate([part.indices + np.uint32(start) for part, start in zip(meshes, starts, strict=False)])
-    return Mesh(name, columns[0], indices, columns[1], columns[2], columns[3])
-
-
-def _grid(columns: int, rows: int, degenerate: tuple[bool, bool] = (False, False)) -> npt.NDArray[np.int64]:
-    """Triangles of a grid of (rows+1)×(columns+1) vertices; a degenerate first or last row is a pole."""
-    i, j = np.meshgrid(np.arange(columns), np.arange(rows))
-    a = j * (columns + 1) + i
-    b, c, d = a + columns + 1, a + columns + 2, a + 1
-    lower, upper = np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)
-    if degenerate[1]:
-        lower = lower[:-1]
-        upper[-1, :, 1] = b[-1]
-    if degenerate[0]:
-        upper = upper[1:]
-    return np.concatenate([lower.reshape(-1, 3), upper.reshape(-1, 3)])
-
-
-def _lathe(name: str, profile: Sequence[tuple[float, float, float, float]], segments: int) -> Mesh:
-    """A profile of (radius, height, normal's radial part, normal's height) from top to bottom, turned about Y."""
-    r, y, nr, ny = np.array(profile, np.float64).T
-    rows = len(r) - 1
-    i = np.arange(segments + 1)
-    phi = 2 * np.pi * (i % segments) / segments  # the seam repeats the first column's bits
-    sin, cos = np.sin(phi), np.cos(phi)
-    positions = np.stack([np.outer(r, sin), np.repeat(y[:, None], segments + 1, 1), np.outer(r, cos)], axis=-1)
-    normals = np.stack([np.outer(nr, sin), np.repeat(ny[:, None], segments + 1, 1), np.outer(nr, cos)], axis=-1)
-    u = np.repeat((i / segments)[None], rows + 1, 0)
-    turn = np.repeat(phi[None], rows + 1, 0)
-    poles = r == 0
-    u[poles] += 0.5 / segments  # a pole's vertex belongs to one triangle: it takes the middle of its side
-    turn[poles] += np.pi / segments
-    uv = np.stack([u, np.repeat(np.linspace(0, 1, rows + 1)[:, None], segments + 1, 1)], axis=-1)
-    along = np.stack([np.cos(turn), np.zeros_like(turn), -np.sin(turn)], axis=-1)
-    return _mesh(name, positions, _grid(segments, rows, (bool(poles[0]), bool(poles[-1]))), unit(normals), uv, along)
-
-
-def _cap(radius: float, height: float, up: bool, segments: int) -> Mesh:
-    """A disc of one fan, its texture as seen from outside."""
-    phi = 2 * np.pi * np.arange(segments) / segments
-    x, z = radius * np.sin(phi), radius * np.cos(phi)
-    positions = np.concatenate([[[0, height, 0]], np.stack([x, np.full(segments, height), z], axis=1)])
-    sign = 1.0 if up else -1.0
-    uv = 0.5 + 0.5 * positions[:, [0, 2]] / radius * (1, sign)
-    ring = np.arange(segments) + 1
-    ahead = np.roll(ring, -1)
-    center = np.zeros(segments, np.int64)
-    triangles = np.stack([center, ring, ahead] if up else [center, ahead, ring], axis=1)
-    return _mesh("cap", positions, triangles, (0, sign, 0), uv, (1, 0, 0))
-
-
 def plane(size: Sequence[float], segments: int) -> Mesh:
     """A horizontal rectangle facing +Y, `size` along X and Z."""
     t = np.linspace(0, 1, segments + 1)
     u, v = np.meshgrid(t, t)
     positions = np.stack([(u - 0.5) * size[0], np.zeros_like(u), (v - 0.5) * size[1]], axis=-1)
-    return _mesh("plane", positions, _grid(segments, segments), (0, 1, 0), np.stack([u, v], axis=-1), (1, 0, 0))
+    return side_mesh("plane", positions, grid(segments, segments), (0, 1, 0), np.stack([u, v], axis=-1), (1, 0, 0))
 
 
 def box(size: Sequence[float]) -> Mesh:
@@ -198,8 +87,8 @@ def box(size: Sequence[float]) -> Mesh:
     ):
         u, v = np.array([[0, 0], [0, 1], [1, 1], [1, 0]]).T[:, :, None]
         positions = (np.asarray(out) + (2 * u - 1) * np.asarray(right) + (1 - 2 * v) * np.asarray(up)) * half
-        parts.append(_mesh("side", positions, [[0, 1, 2], [0, 2, 3]], out, np.concatenate([u, v], axis=1), right))
-    return _joined("box", parts)
+        parts.append(side_mesh("side", positions, [[0, 1, 2], [0, 2, 3]], out, np.concatenate([u, v], axis=1), right))
+    return joined("box", parts)
 
 
 def sphere(radius: float, segments: int, rings: int) -> Mesh:
@@ -207,19 +96,19 @@ def sphere(radius: float, segments: int, rings: int) -> Mesh:
     theta = np.pi * np.arange(rings + 1) / rings
     sin, cos = np.sin(theta), np.cos(theta)
     sin[0] = sin[-1] = 0.0  # poles are one point
-    return _lathe("sphere", [(radius * s, radius * c, s, c) for s, c in zip(sin, cos, strict=True)], segments)
+    return lathe("sphere", [(radius * s, radius * c, s, c) for s, c in zip(sin, cos, strict=True)], segments)
 
 
 def cylinder(radius: float, height: float, segments: int) -> Mesh:
     half = height / 2
-    side = _lathe("side", [(radius, half, 1, 0), (radius, -half, 1, 0)], segments)
-    return _joined("cylinder", [side, _cap(radius, half, True, segments), _cap(radius, -half, False, segments)])
+    side = lathe("side", [(radius, half, 1, 0), (radius, -half, 1, 0)], segments)
+    return joined("cylinder", [side, cap(radius, half, True, segments), cap(radius, -half, False, segments)])
 
 
 def cone(radius: float, height: float, segments: int) -> Mesh:
     """An upright cone, its tip at the top, with a flat base."""
     half = height / 2
-    tip = _lathe("side", [(0, half, height, radius), (radius, -half, height, radius)], segments)
+    tip = lathe("side", [(0, half, height, radius), (radius, -half, height, radius)], segments)
     phi = 2 * np.pi * (np.arange(segments + 1) + 0.5) / segments  # the tip has no normal: each side's own stands there
     slope = unit([height, radius])
     normals = tip.normals.copy()
@@ -227,14 +116,14 @@ def cone(radius: float, height: float, segments: int) -> Mesh:
         [slope[0] * np.sin(phi), np.full(segments + 1, slope[1]), slope[0] * np.cos(phi)], axis=1
     )
     side = Mesh("side", tip.positions, tip.indices, normals, tip.tangents, tip.uv0)
-    return _joined("cone", [side, _cap(radius, -half, False, segments)])
+    return joined("cone", [side, cap(radius, -half, False, segments)])
 
 
 def torus(radius: float, tube: float, segments: int, sides: int) -> Mesh:
     """A ring in the XZ plane: `radius` to the middle of a tube of radius `tube`."""
     theta = np.pi - 2 * np.pi * (np.arange(sides + 1) % sides) / sides
     profile = [(radius + tube * c, tube * s, c, s) for c, s in zip(np.cos(theta), np.sin(theta), strict=True)]
-    return _lathe("torus", profile, segments)
+    return lathe("torus", profile, segments)
 
 
 def torus_knot(radius: float, tube: float, p: int, q: int, segments: int, sides: int) -> Mesh:
@@ -263,7 +152,7 @@ def torus_knot(radius: float, tube: float, p: int, q: int, segments: int, sides:
     positions = center + tube * normals
     u, v = np.meshgrid(np.arange(segments + 1) / segments * max(p, q) * 2, np.arange(sides + 1) / sides)
     uv = np.stack([u, v], axis=-1)
-    return _mesh("torus_knot", positions, _grid(segments, sides), normals, uv, np.tile(ahead, (sides + 1, 1)))
+    return side_mesh("torus_knot", positions, grid(segments, sides), normals, uv, np.tile(ahead, (sides + 1, 1)))
 
 
 def stairs(size: Sequence[float], steps: int) -> Mesh:
@@ -279,15 +168,15 @@ def stairs(size: Sequence[float], steps: int) -> Mesh:
     uv = np.stack([zy[:, 0], 1 - zy[:, 1]], axis=1)
     ears = clip_ears(left)
     parts = [
-        _mesh("left", left, ears, (-1, 0, 0), uv * (-1, 1) + (1, 0), (0, 0, 1)),
-        _mesh("right", right, ears[:, ::-1], (1, 0, 0), uv, (0, 0, -1)),
+        side_mesh("left", left, ears, (-1, 0, 0), uv * (-1, 1) + (1, 0), (0, 0, 1)),
+        side_mesh("right", right, ears[:, ::-1], (1, 0, 0), uv, (0, 0, -1)),
     ]
     for a, b in zip(range(len(left)), [*range(1, len(left)), 0], strict=True):
         corners = np.stack([left[b], left[a], right[a], right[b]])
         normal = unit(np.cross(corners[1] - corners[0], corners[2] - corners[0]))
         square = [[0, 0], [0, 1], [1, 1], [1, 0]]
-        parts.append(_mesh("tread", corners, [[0, 1, 2], [0, 2, 3]], normal, square, (1, 0, 0)))
-    return _joined("stairs", parts)
+        parts.append(side_mesh("tread", corners, [[0, 1, 2], [0, 2, 3]], normal, square, (1, 0, 0)))
+    return joined("stairs", parts)
 
 
 def sphere_grid(
@@ -304,10 +193,10 @@ def sphere_grid(
     ball = sphere(radius, segments, rings)
     parts = []
     for row, metal in enumerate(np.linspace(metallic[0], metallic[1], rows)):
-        for column, rough in enumerate(np.linspace(roughness[0], roughness[1], columns)):
-            at = ((column - (columns - 1) / 2) * spacing, (row - (rows - 1) / 2) * spacing, 0.0)
+        for place, rough in enumerate(np.linspace(roughness[0], roughness[1], columns)):
+            at = ((place - (columns - 1) / 2) * spacing, (row - (rows - 1) / 2) * spacing, 0.0)
             changes = (("roughness", float(rough)), ("metallic", float(metal)))
-            parts.append(ShapePart(ball, translation(at), f"/{column}_{row}", changes))
+            parts.append(ShapePart(ball, translation(at), f"/{place}_{row}", changes))
     return parts
 
 
@@ -381,6 +270,49 @@ _KINDS: dict[str, Shape] = {
         (_SIZE, Key("steps", whole(1, 200), "Number of steps.", 5)),
         stairs,
         lambda v: 12 * v["steps"],
+    ),
+    "arch": Shape(
+        "A wall with a round-arched opening from its foot up.",
+        (
+            Key("size", vector(3, 0, above=True), "Extent along X, Y and Z.", (3.0, 4.0, 0.5), "m"),
+            Key("span", LENGTH, "Width of the opening.", 2.0, "m"),
+            Key("spring", number(0), "Height at which it begins to be round.", 2.0, "m"),
+            Key("segments", whole(4, 256), "Sides of the round.", 32),
+        ),
+        arch,
+        lambda v: 4 * v["segments"] + 40,
+    ),
+    "vault": Shape(
+        "A block with a groin vault as its underside.",
+        (
+            Key("size", vector(3, 0, above=True), "Extent along X, Y and Z.", (3.0, 1.6, 3.0), "m"),
+            Key("segments", whole(2, 64), "Sides from the crown to a wall.", 12),
+        ),
+        vault,
+        lambda v: 8 * (v["segments"] + 2) ** 2 + 16 * v["segments"],
+    ),
+    "column": Shape(
+        "A round column with base and capital.",
+        (
+            Key("radius", LENGTH, "Radius of the foot of its shaft; the base reaches 1.4 of it.", 0.2, "m"),
+            Key("height", LENGTH, "Extent along Y.", 2.4, "m"),
+            _SEGMENTS,
+        ),
+        column,
+        lambda v: 70 * (v["segments"] + 1),
+    ),
+    "plant": Shape(
+        "Leaves that bend down, for a material with a `leaf` texture and `double_sided`; not closed.",
+        (
+            Key("leaves", whole(1, 20000), "Number of leaves.", 24),
+            Key("length", LENGTH, "Length of a leaf.", 0.6, "m"),
+            Key("width", LENGTH, "Width of its image.", 0.3, "m"),
+            Key("crown", vector(3, 0), "Extent of a bush; 0 for leaves from one point.", (0.0, 0.0, 0.0), "m"),
+            Key("droop", number(0, 180), "How far a leaf bends down.", 70.0, "°"),
+            Key("seed", whole(0), "Another number gives another plant.", 0),
+        ),
+        plant,
+        lambda v: 10 * v["leaves"],
     ),
     "sphere_grid": Shape(
         "Spheres in the XY plane, objects `name/column_row`: roughness to the right, metallic up.",

@@ -253,7 +253,7 @@ def test_shipped_scene(name: str) -> None:
     path = shipped_scenes()[name]
     lines = path.read_text().splitlines()
     assert lines[0].startswith("# ")
-    longer = {"many_lights": 120, "courtyard": 60}  # whose bulbs and stones differ from each other
+    longer = {"many_lights": 120, "courtyard": 60, "arcade": 80}  # whose bulbs and stones differ from each other
     assert len(lines) <= longer.get(name, 40)
     scene = load(path)
     assert scene.warnings == ()
@@ -267,10 +267,12 @@ def test_shipped_scenes_are_all_there() -> None:
 
 @pytest.mark.slow
 def test_what_casts_shadows_in_shipped_scenes_is_closed() -> None:
-    """Shadow volumes need closed casters: open planes must not cast."""
+    """Shadow volumes need closed casters: open planes must not cast. Leaves are masked, for shadow maps alone."""
     for path in shipped_scenes().values():
         scene = load(path)
         for entry in scene.objects:
+            if scene.materials[entry.material].alpha_mode == "mask":
+                continue
             assert not (entry.casts_shadow and scene.meshes[entry.mesh].edges.gap), (path.name, entry.name)
 
 
