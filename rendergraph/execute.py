@@ -14,6 +14,8 @@ import numpy.typing as npt
 from msgspec import Struct, field
 
 from rendergraph.compile import SCENE_CHANGES, Executable
+from rendergraph.compile.executable import FrameStep
+from rendergraph.compile.light_means import LightMeans, averaged_textures
 from rendergraph.declare import Node, Port, Views
 from rendergraph.declare.blame import author_problem
 from rendergraph.document import shown
@@ -225,19 +227,29 @@ class Runner(Struct, eq=False):
                     textures.Clear(self.executable.device, memory.texture(name, parity), resource.first)()
 
     def run(
-        self, index: int, time: float, delta: float, scene: Scene, camera: ViewMatrices, *, timed: bool = False
+        self,
+        index: int,
+        time: float,
+        delta: float,
+        scene: Scene,
+        camera: ViewMatrices,
+        *,
+        timed: bool = False,
+        moment: int = 0,
+        moments: int = 1,
     ) -> FrameTimes | None:
-        """Draw one frame.
+        """Draw one frame, or one moment of it; the last moment leaves the mean of their light.
 
         Args:
             index: frame number, from 1.
             time: seconds since frame 1.
             timed: measure each step; otherwise nothing is measured and None returned.
+            moment: number from 0 of as many `moments`, which are drawn one after the other.
         """
         executable, views = self.executable, self.executable.views
         start = perf_counter()
         moved_from, self._seen = self._seen, (scene, camera)
-        if self.drawn:
+        if self.drawn and not moment:
             views.advance()
         camera = self._jittered(camera)
         views.set(CAMERA, (camera,))
@@ -258,14 +270,15 @@ class Runner(Struct, eq=False):
             self._compute_uploads()
         executable.end_updates()
         if executable.reads_frame:
-            self._count_still(moved_from, time)
+            if not moment:
+                self._count_still(moved_from, time)
             if views.set_frame(time, delta, index, self._still):
                 executable.touched.add("frame_block")
         if not self._complete:
             self._check_views()
         if not self.drawn:
             views.advance()  # nothing has moved before the first frame
-        self.drawn += 1
+        self.drawn += moment == moments - 1
         if views.changed or moved:
             executable.cull_and_sort(moved=moved, cull=self.cull)
             executable.touched |= {("view", table) for table in views.changed}
@@ -277,11 +290,13 @@ class Runner(Struct, eq=False):
         if fresh:
             self.activate()
         # Counted by frames drawn, not by their numbers.
-        parity = self._parity = (self._parity + 1) % len(executable.steps)
+        parity = self._parity = (self._parity + (not moment)) % len(executable.steps)
         if fresh or len(executable.binds) > 1:  # else everything is still bound from the frame before
             for call in executable.binds[parity]:
                 call()
-        listed = executable.steps_for_frame(parity, reuse=self.reuse)
+        listed = executable.steps_for_frame(parity, reuse=self.reuse and moments == 1)
+        if moments > 1:
+            listed = self._with_means(parity, moment, moments)
         self.ran = len(listed)
         taken: list[tuple[Step, float, Timer]] = []
         measured = executable.device.can_time
@@ -313,6 +328,15 @@ class Runner(Struct, eq=False):
             gpu = timer.milliseconds() if measured else None
             steps.append(StepTime(done.node, cpu * 1e3, gpu, done.index, done.label))
         return FrameTimes(frame_ms, tuple(steps), self.ran)
+
+    def _with_means(self, parity: int, moment: int, moments: int) -> list[FrameStep]:
+        """The steps of a frame that average the light of its moments."""
+        executable = self.executable
+        if executable.means is None:
+            semantics = {str(end): info.semantic for end, info in self.graph.textures.items()}
+            executable.means = LightMeans(executable, averaged_textures(executable.plan, semantics))
+        executable.means.moment, executable.means.count = moment, moments
+        return executable.steps_with_stops(parity, executable.means.calls(parity))
 
     def _compute_uploads(self) -> None:
         executable = self.executable

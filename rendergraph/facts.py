@@ -55,10 +55,15 @@ class MaterialFacts(Struct, frozen=True):
 
 
 class CameraFacts(Struct, frozen=True):
-    """The camera that the pipeline renders with; `extra` has the values of plugins' keys."""
+    """The camera that the pipeline renders with; `extra` has the values of plugins' keys.
+
+    Attributes:
+        shutter: how much of a frame's time it is open, the most of any frame; 0 while `subframes` are averaged.
+    """
 
     name: str = ""
     extra: Extra = NO_EXTRA
+    shutter: float = 0.0
 
 
 def casting_lights(wanted: str | Sequence[str], lights: Sequence[Any]) -> tuple[int, ...]:

@@ -147,6 +147,12 @@ def _positive(text: str) -> float:
     return number
 
 
+def _share(text: str) -> float:
+    if not re.fullmatch(r"0?\.\d{1,9}|[01](\.0*)?", text):
+        raise ValueError(f"'{text}' is not a share from 0 to 1, as in 0.5")
+    return float(text)
+
+
 def _devices(text: str) -> tuple[int, ...]:
     if text and not re.fullmatch(r"[0-9]{1,4}(,[0-9]{1,4})*", text):
         raise ValueError(f"'{text}' is not NUMBER,NUMBER, as `doctor` numbers GL devices")
@@ -244,7 +250,15 @@ executor_options = together(
 SELECTION_OPTIONS = {
     "scene": scene_option,
     "camera": click.option(
-        "--camera", metavar="NAME", shell_complete=offered("cameras"), help="Camera of the scene to render from."
+        "--camera",
+        metavar="NAME",
+        shell_complete=offered("cameras"),
+        help="Camera of the scene to render from, or a camera in words: 'eye=0,1,5 target=0,1,0 fov=40'.",
+    ),
+    "shutter": click.option(
+        "--shutter",
+        type=Parsed("SHARE", _share),
+        help="How much of a frame's time the camera's shutter is open, 0 to 1, for motion blur.",
     ),
     "environment": click.option(
         "--environment",

@@ -29,6 +29,13 @@ if TYPE_CHECKING:
 @options.pipeline_options
 @click.option("--frames", type=options.FRAMES, help="Frames to render; `####` in a file name becomes the number.")
 @click.option("--fps", type=options.POSITIVE, help="Frames per second.  [default: 30]")
+@click.option(
+    "--subframes",
+    type=click.IntRange(1, 4096),
+    metavar="N",
+    default=1,
+    help="Render each frame at N moments while the shutter is open, and average their light.",
+)
 @click.option("-o", "--output", "outputs", multiple=True, type=options.OUTPUT, help="Write an output to a file.")
 @click.option(
     "--tap",

@@ -34,7 +34,17 @@ def run_key(planned: Planned, frame: int, reference: str) -> str:
     linked, selection = planned.linked, planned.linked.selection
     files = [str(linked.spec.scene), str(selection.environment), sources_digest(planned)]
     spec = linked.spec.to_yaml(origins=False)
-    parts = [__version__, spec, files, selection.camera, linked.graph.size, frame, reference, *_metrics(planned)]
+    parts = [
+        __version__,
+        spec,
+        files,
+        selection.camera,
+        selection.shutter,
+        linked.graph.size,
+        frame,
+        reference,
+        *_metrics(planned),
+    ]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct, field
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from rendergraph.allocate import ResourcePlan
     from rendergraph.compile.culling import SceneView
     from rendergraph.compile.gpu_scene import GpuScene
+    from rendergraph.compile.light_means import LightMeans
     from rendergraph.compile.memory import Memory
     from rendergraph.compile.uploads import UploadedValues
     from rendergraph.compile.views import ViewBuffers
@@ -158,6 +160,7 @@ class Executable(Struct, eq=False, dict=True):
         fresh: `statics` have to be written and everything bound before the next frame.
         uses_previous: a program looks at where things were in the frame before.
         shares_kept: what they make may be taken over from other pipelines, and by those.
+        means: of light over the moments of a frame, once a frame has several.
     """
 
     device: Device
@@ -180,6 +183,7 @@ class Executable(Struct, eq=False, dict=True):
     uses_previous: bool = False
     has_new_kept: bool = False
     shares_kept: bool = True
+    means: LightMeans | None = None
     contents: dict[str, bytes] = field(default_factory=dict)
     stale: set[str] = field(default_factory=set)
     touched: set[Source] = field(default_factory=set)
@@ -335,6 +339,27 @@ class Executable(Struct, eq=False, dict=True):
             if len(self._parts) >= _MOST_PARTS:
                 self._parts.clear()
             self._parts[key] = self._listed(parity, positions)
+        return self._parts[key]
+
+    def steps_with_stops(self, parity: int, stops: Mapping[int, Call]) -> list[FrameStep]:
+        """All steps of a frame, with calls that leave any state before those at some positions, or behind the last one.
+
+        Call it behind `steps_for_frame`, which says which kept steps are due.
+        """
+        keys = [compiled.step.key for compiled in self.steps[0]]
+        positions = tuple(at for at, key in enumerate(keys) if key not in self.kept or key in self.due)
+        key = parity, (-1, *positions)
+        if key not in self._parts:
+            found: list[FrameStep] = []
+            edges = [0, *(at for at in sorted(stops) if at), len(keys)]
+            for low, high in pairwise(edges):
+                part = self._listed(parity, [at for at in positions if low <= at < high])
+                if low in stops and part:
+                    part[0] = FrameStep(part[0].step, (stops[low], *part[0].calls), part[0].timer)
+                found += part
+            if len(keys) in stops:
+                found[-1] = FrameStep(found[-1].step, (*found[-1].calls, stops[len(keys)]), found[-1].timer)
+            self._parts[key] = found
         return self._parts[key]
 
     @cached_property
@@ -502,6 +527,7 @@ class Executable(Struct, eq=False, dict=True):
         """Free what it owns; programs and scenes are the session's."""
         self.vertex_arrays()
         owned: list[Any] = [self.memory, self.views, *self.buffers, *self.timers, *self.occlusion_queries]
+        owned += [self.means] if self.means is not None else []
         for each in owned:
             each.release()
         self.timers.clear()

@@ -14,7 +14,7 @@ from msgspec.structs import astuple, replace
 from rendergraph.errors import InputError, Option, Place, Problem, suggestion
 from rendergraph.facts import NO_EXTRA, Extra
 from rendergraph.scene import scene_values
-from rendergraph.scene.cameras import WIDE, bounding_sphere, framing_camera
+from rendergraph.scene.cameras import WIDE, bounding_sphere, described_camera, framing_camera
 from rendergraph.scene.geometry import rigid, translation
 from rendergraph.scene.model import Matrix, Placement, Scene
 from rendergraph.scene.surroundings import lit
@@ -26,16 +26,34 @@ _MOMENTS = 12
 """Of a clip that a framing camera looks at."""
 
 
-def complete(scene: Scene, camera_name: str | None = None, aspect: float = WIDE, *, bare: bool = False) -> Scene:
+def complete(
+    scene: Scene,
+    camera_name: str | None = None,
+    aspect: float = WIDE,
+    *,
+    bare: bool = False,
+    shutter: float | None = None,
+) -> Scene:
     """Return the scene with a camera and with light (`surroundings.lit`); the chosen camera comes first.
 
-    Call it once, before `at`: the added light stays in place while the camera moves. `aspect` is width over height of
-    the picture for an added camera, and `bare` adds no surroundings.
+    Call it once, before `at`: the added light stays in place while the camera moves.
+
+    Args:
+        camera_name: of a camera of the scene, or a camera as text, `eye=0,1,5 target=0,1,0 fov=40`.
+        aspect: width over height of the picture for an added camera.
+        bare: add no surroundings.
+        shutter: that of all cameras.
     """
     cameras = dict(scene.cameras)
     if not cameras:
         cameras["default"] = framing_camera(_over_clips(scene), aspect)
-    if camera_name is not None:
+    if shutter is not None:
+        cameras = {name: replace(camera, shutter=shutter) for name, camera in cameras.items()}
+        changed = {key: {**values, "shutter": shutter} for key, values in scene.recipe.items() if key[0] == "cameras"}
+        scene = replace(scene, recipe={**scene.recipe, **changed})
+    if camera_name is not None and "=" in camera_name:
+        cameras = {"camera": described_camera(camera_name, next(iter(cameras.values()))), **cameras}
+    elif camera_name is not None:
         if camera_name not in cameras:
             text = f"the scene has no camera '{camera_name}'{suggestion(camera_name, cameras)}"
             raise InputError(Problem("RG322", text, Place(Option("--camera", camera_name))))

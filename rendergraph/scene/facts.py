@@ -77,7 +77,10 @@ def material_facts(scene: Scene) -> tuple[MaterialFacts, ...]:
 
 def camera_facts(scene: Scene) -> CameraFacts:
     """Of the first camera, which is the one that renders."""
-    return CameraFacts(scene.camera.name, scene.camera.extra) if scene.camera is not None else CameraFacts()
+    if (camera := scene.camera) is None:
+        return CameraFacts()
+    frames = scene.keyframes.get(f"cameras.{camera.name}.shutter", ())
+    return CameraFacts(camera.name, camera.extra, max([camera.shutter, *(value for _, value in frames)]))
 
 
 def environment_facts(scene: Scene) -> TextureDesc | None:

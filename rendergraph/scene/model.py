@@ -326,6 +326,7 @@ class Camera(Struct, frozen=True, eq=False):
         frustum: left, right, bottom, top at the near plane in metres.
         near, far: metres; far may be infinite for perspective.
         target: the point it was aimed at, for orbits; None where unknown.
+        shutter: how much of a frame's time it is open, centred on the frame's moment.
     """
 
     name: str
@@ -338,6 +339,7 @@ class Camera(Struct, frozen=True, eq=False):
     far: float = 100.0
     target: Vec3 | None = None
     extra: Extra = NO_EXTRA
+    shutter: float = 0.0
 
 
 class Environment(Struct, frozen=True):

@@ -247,6 +247,7 @@ CAMERA = Table(
         Key("frustum", vector(4), "Left, right, bottom, top at the near plane; makes it off-centre.", None, "m"),
         Key("near", LENGTH, "Near plane.", 0.05, "m"),
         Key("far", number(0, above=True, infinite=True), "Far plane; `.inf` for none.", 100.0, "m"),
+        _unit("shutter", "How much of a frame's time it is open, for motion blur.", 0.0),
     ),
 )
 

@@ -79,6 +79,7 @@ def camera(name: str, values: Mapping[str, Any]) -> Camera:
         far,
         target,
         values.get("extra", NO_EXTRA),
+        values.get("shutter", 0.0),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from time import perf_counter
+from typing import Any
 
 from msgspec import Struct, field
 
@@ -45,13 +46,15 @@ class Drawing(Struct, eq=False, dict=True):
     times: list[FrameTimes] = field(default_factory=list)
     number: int = 0
     camera: Camera | None = None
-    _held: tuple[int, Scene] | None = None
+    _held: tuple[float, Scene] | None = None
 
     def __post_init__(self) -> None:
         options = self.expanded.options
         self.runner = Runner(self.executable, self.expanded.linked.graph, options.reuses, options.cull)
         history = any(r.role == "history" for r in self.executable.plan.resources.values())
         self._remembers = history or self.executable.uses_previous
+        # Where things were is all that a frame then knows of earlier ones.
+        self._lead = None if history or self.runner.jittering or self.executable.reads_frame else 1
 
     def begin(self, lead: int | None = None) -> None:
         """Warm up if the options say so, and clear the history."""
@@ -83,37 +86,63 @@ class Drawing(Struct, eq=False, dict=True):
             if number <= self.number:
                 self.runner.reset()
                 self.number = 0
-            for earlier in range(self.number + 1, number):
-                self._draw(earlier)
+            begin = self.number + 1 if self._lead is None else max(self.number + 1, number - self._lead)
+            for earlier in range(begin, number):
+                self._draw(earlier, moments=self._lead is None)
         self.times.append(self._draw(number, camera))
         self.runner.check()
         self.number = number
 
-    def _draw(self, number: int, camera: Camera | None = None) -> FrameTimes:
+    def _draw(self, number: int, camera: Camera | None = None, *, moments: bool = True) -> FrameTimes:
         linked, fps, still = self.expanded.linked, self.expanded.options.fps, self.expanded.options.still
-        moment = number if still is None else min(number, still)
-        time, scene = (moment - 1) / fps, linked.scene
+        time = ((number if still is None else min(number, still)) - 1) / fps
         if self.runner.drawn:
             self.scene.advance()
-        if animate.moves(scene):
-            if (
-                still is None or self._held is None or self._held[0] != moment
-            ):  # else nothing has moved, nor may seem to
-                self._held = moment, animate.at(scene, time)
-                self.executable.fresh |= self.scene.update(self._held[1])
-            scene = self._held[1]
-        if not self.runner.drawn:
-            self.scene.advance()  # the first frame has no motion
-        self.camera = camera or scene.cameras[linked.selection.camera or next(iter(scene.cameras))]
-        view = view_matrices(self.camera, linked.graph.size)
-        begun = perf_counter()
-        with activity.limited_draw():
-            times = self.runner.run(number, time, 1.0 / fps, scene, view, timed=self.expanded.options.timed)
-            if times is None:
-                self.gpu.device.ctx.finish()
-                times = FrameTimes((perf_counter() - begun) * 1e3, (), self.runner.ran)
+        times: list[FrameTimes] = []
+        each = self._moments(time) if moments else [time]
+        for part, moment in enumerate(each):
+            scene = self._scene_at(moment)
+            if not self.runner.drawn:
+                self.scene.advance()  # the first frame has no motion
+            self.camera = camera or scene.camera
+            assert self.camera is not None  # a completed scene has one
+            view = view_matrices(self.camera, linked.graph.size)
+            begun = perf_counter()
+            with activity.limited_draw():
+                options: dict[str, Any] = {"moment": part, "moments": len(each), "timed": self.expanded.options.timed}
+                found = self.runner.run(number, moment, 1.0 / fps, scene, view, **options)
+                if found is None:
+                    self.gpu.device.ctx.finish()
+                    found = FrameTimes((perf_counter() - begun) * 1e3, (), self.runner.ran)
+                times.append(found)
         _NOTE_DONE()
-        return times
+        if len(times) == 1:
+            return times[0]
+        steps = tuple(step for found in times for step in found.steps)
+        return FrameTimes(sum(found.frame_ms for found in times), steps, sum(found.ran for found in times))
+
+    def _scene_at(self, time: float) -> Scene:
+        scene = self.expanded.linked.scene
+        if not animate.moves(scene):
+            return scene
+        # With `still` nothing has moved, nor may seem to.
+        if self._held is None or self.expanded.options.still is None or self._held[0] != time:
+            self._held = time, animate.at(scene, time)
+            self.executable.fresh |= self.scene.update(self._held[1])
+        return self._held[1]
+
+    def _moments(self, time: float) -> list[float]:
+        """The moments of the open shutter that are averaged in a frame, the one nearest to its own time last.
+
+        What is no light is that of the last moment, as is what the next frame reads of this one.
+        """
+        options, scene = self.expanded.options, self.expanded.linked.scene
+        if options.subframes == 1 or not (animate.moves(scene) or self.executable.moves_with_time):
+            return [time]
+        camera = animate.at(scene, time).camera
+        span = camera.shutter / options.fps if camera is not None else 0.0
+        offsets = [((number + 0.5) / options.subframes - 0.5) * span for number in range(options.subframes)]
+        return [time + offset for offset in sorted(offsets, key=abs, reverse=True)] if span else [time]
 
     def read(self) -> Frame:
         """Read back the requested outputs of the last frame."""
@@ -140,15 +169,22 @@ class Drawing(Struct, eq=False, dict=True):
             culled=dict(plan.schedule.culled),
             metadata={**self._metadata, **frame_metadata(self.number, self.expanded.options.fps)},
             times=tuple(self.times),
-            warnings=(*dict.fromkeys(self.gpu.cache.image_warnings), *self._single_frame_warnings(), *self._ray_notes),
+            warnings=(*dict.fromkeys(self.gpu.cache.image_warnings), *self._frame_warnings(), *self._ray_notes),
         )
 
-    def _single_frame_warnings(self) -> Iterator[Problem]:
-        """Yield a warning if a single frame is rendered of a pipeline that accumulates frames."""
-        node = self.runner.jittering
-        if node is not None and self.expanded.options.frames == range(1, 2):
+    def _frame_warnings(self) -> Iterator[Problem]:
+        """Yield warnings about frames that show less than was asked for."""
+        options, graph = self.expanded.options, self.expanded.linked.graph
+        node, text = self.runner.jittering, ""
+        if node is not None and options.frames == range(1, 2):
             text = f"'{node}' accumulates over frames, but only frame 1 was rendered; --frames 16-16 shows more"
-            yield Problem("RG620", text, Place(self.expanded.linked.graph.name), severity="warning")
+            yield Problem("RG620", text, Place(graph.name), severity="warning")
+        elif graph.camera.shutter and self.executable.uses_previous and options.frames == range(1, 2):
+            text = "motion is measured from frame to frame, but only frame 1 was rendered; --frames 2-2 shows it"
+            yield Problem("RG627", text, Place(graph.name), severity="warning")
+        if options.subframes > 1 and not (self.camera is None or self.camera.shutter):
+            text = f"the camera's shutter is never open, so {options.subframes} subframes are one; add --shutter 0.5"
+            yield Problem("RG628", text, Place(graph.name), severity="warning")
 
     @cached_property
     def _ray_notes(self) -> tuple[Problem, ...]:

@@ -23,6 +23,7 @@ TEXTURE_PART = (
 
 MOST_FRAMES = 100_000
 """Per run: an hour at 30 frames per second."""
+MOST_SUBFRAMES = 4096
 
 
 class Selection(Struct, frozen=True):
@@ -33,6 +34,7 @@ class Selection(Struct, frozen=True):
         scene, size: override the file's; `size` is width and height in pixels.
         environment: an equirectangular image that replaces the scene's.
         camera: name of the scene's camera; its first by default.
+        shutter: overrides the cameras': how much of a frame's time it is open, 0 to 1.
         sets: values of `-s`, such as `ao.radius=0.8`.
         patches: merge patches, as files or mappings.
         asset_roots: more folders from which files may be read.
@@ -44,6 +46,7 @@ class Selection(Struct, frozen=True):
     source: str | Mapping[str, Any]
     scene: str | None = None
     camera: str | None = None
+    shutter: float | None = None
     environment: Path | None = None
     size: tuple[int, int] | None = None
     sets: tuple[str, ...] = ()
@@ -55,6 +58,8 @@ class Selection(Struct, frozen=True):
     def __post_init__(self) -> None:
         if self.size is not None:
             force_setattr(self, "size", _pair(self.size))
+        if self.shutter is not None and not 0 <= self.shutter <= 1:
+            raise UsageError(Problem("RG500", f"shutter: expected a share of a frame, 0 to 1, got {self.shutter}"))
         if not self.limits:
             return
         known = {name for names in _limit_names().values() for name in names}
@@ -112,6 +117,7 @@ class RenderKeywords(TypedDict, total=False):
     reuse: bool | None
     cull: bool
     still: int | None
+    subframes: int
 
 
 class RenderOptions(Struct, frozen=True):
@@ -132,6 +138,8 @@ class RenderOptions(Struct, frozen=True):
             skipped steps take no time. No bit of a picture depends on it.
         cull: skip objects outside the view that they would be rendered with. No bit of a picture depends on it.
         still: a frame after which the scene, the camera and the time stay as they are, so that pictures accumulate.
+        subframes: number of moments while the camera's shutter is open, centred on the frame's, of whose light a frame
+            is the mean. Histories advance once a frame.
     """
 
     frames: range = range(1, 2)
@@ -147,6 +155,7 @@ class RenderOptions(Struct, frozen=True):
     reuse: bool | None = None
     cull: bool = True
     still: int | None = None
+    subframes: int = 1
 
     def __post_init__(self) -> None:
         if not isinstance(self.frames, range) or not self.frames or min(self.frames[0], self.frames[-1]) < 1:
@@ -156,6 +165,9 @@ class RenderOptions(Struct, frozen=True):
             raise UsageError(Problem("RG500", text))
         if len(self.frames) > MOST_FRAMES:
             text = f"{len(self.frames)} frames exceed the limit of {MOST_FRAMES} per run; render them in several runs"
+            raise UsageError(Problem("RG500", text))
+        if not isinstance(self.subframes, int) or not 1 <= self.subframes <= MOST_SUBFRAMES:
+            text = f"subframes: expected a number from 1 to {MOST_SUBFRAMES}, got {self.subframes!r}"
             raise UsageError(Problem("RG500", text))
         if not self.fps > 0:
             raise UsageError(Problem("RG500", f"fps: expected a number above 0, got {self.fps}"))

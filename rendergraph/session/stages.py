@@ -145,6 +145,9 @@ def fitting_links(resolved: Resolved) -> dict[str, dict[str, list[str]]]:
 
 def expand(linked: Linked, options: RenderOptions = RenderOptions()) -> Expanded:
     """Record the steps of all requested outputs."""
+    if options.subframes > 1:  # they blur; nodes that imitate the shutter have nothing to do
+        graph = linked.graph
+        linked = replace(linked, graph=replace(graph, camera=replace(graph.camera, shutter=0.0)))
     requests = requested_outputs(linked.graph, options)
     ends = {name: port.end for name, port in requests.items()}
     return Expanded(linked, options, requests, rendergraph.expand.expand(linked.graph, ends))

@@ -130,6 +130,7 @@ def test_no_shader_is_an_orphan() -> None:
         "fullscreen.vert",
         "previous_scene.glsl",
         "pose.comp",
+        "light_mean.frag",
         "texture.comp",
         "texture_sample.glsl",
     )

@@ -169,3 +169,46 @@ def test_bounds_are_those_of_every_turned_and_scaled_box(tmp_path: Path) -> None
 def test_hidden_objects_do_not_count(tmp_path: Path) -> None:
     scene = read(tmp_path, "objects: {a: {shape: box}, b: {shape: box, at: [9, 0, 0], hidden: true}}\n")
     assert scene.bounds[1] == (0.5, 0.5, 0.5)
+
+
+def test_a_camera_in_words(tmp_path: Path) -> None:
+    """What it does not say is that of the scene's camera; the keys are those of scene files."""
+    scene = read(
+        tmp_path, "cameras: {m: {eye: [0, 1, 5], target: [0, 1, 0], fov_y_degrees: 30, near: 0.2, shutter: 0.5}}\n"
+    )
+    camera = animate.complete(scene, "eye=2,1,0 fov=40").camera
+    assert camera is not None
+    np.testing.assert_allclose(camera.transform[:3, 3], [2, 1, 0])
+    np.testing.assert_allclose(camera.transform[:3, 2], [1, 0, 0], atol=1e-12)  # it looks at the target from there
+    assert (camera.fov_y, camera.near, camera.shutter) == (math.radians(40), 0.2, 0.5)
+    flat = animate.complete(scene, "height=3").camera
+    assert flat is not None
+    assert (flat.type, flat.height, flat.target) == ("orthographic", 3, (0, 1, 0))
+    same = animate.complete(scene, "near=0.1").camera
+    assert same is not None
+    np.testing.assert_allclose(same.transform, scene.cameras["m"].transform, atol=1e-12)
+    assert math.isclose(same.fov_y, math.radians(30))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    {
+        "eye=1,2": r"--camera 'eye=1,2': RG321 'eye': expected a list of 3 numbers, got 1, 2|expected a list of 3",
+        "eyes=1,2,3": "no key 'eyes'; did you mean 'eye'",
+        "eye=0,0,0 target=0,0,0": "eye and target coincide",
+        "fov=wide": "'fov_y_degrees': expected a number",
+        "fov=40 height=2": "choose one",
+        "eye=[1": "RG0",
+    }.items(),
+)
+def test_mistakes_in_a_camera(tmp_path: Path, text: str, message: str) -> None:
+    scene = read(tmp_path, "cameras: {m: {}}\n")
+    with pytest.raises(InputError, match=message):
+        animate.complete(scene, text)
+
+
+def test_a_shutter_for_all_cameras(tmp_path: Path) -> None:
+    scene = read(tmp_path, "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {0: [0, 0, 1], 1: [0, 0, 5]}}\n")
+    camera = animate.at(animate.complete(scene, shutter=0.25), 0.5).camera
+    assert camera is not None
+    assert camera.shutter == 0.25

@@ -1,0 +1,129 @@
+"""Means of light over the moments in which the camera's shutter is open, for `subframes`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import moderngl
+from msgspec import Struct, field
+from msgspec.structs import replace
+
+from rendergraph.compile.memory import Attachment, Call
+from rendergraph.gl import state as gl_state
+from rendergraph.gl import textures
+from rendergraph.program.text import VERSION
+from rendergraph.resources import folder
+from rendergraph.steps.state import ADD, State
+from rendergraph.textures import Semantic, TextureDesc
+
+if TYPE_CHECKING:
+    from rendergraph.allocate import ResourcePlan
+    from rendergraph.compile.executable import Executable
+
+_ALL_BARRIERS = 0xFFFFFFFF
+
+
+def averaged_textures(plan: ResourcePlan, semantics: Mapping[str, Semantic]) -> dict[int, dict[str, bool]]:
+    """Return by position in the schedule the textures that are averaged before that step, and whether they are encoded.
+
+    Scene-linear light is averaged where a step reads it that makes display colours, and at the end of the frame in
+    outputs. Outputs of display colours that have been made from no such light are decoded for their mean.
+    """
+    resources, steps = plan.resources, plan.schedule.steps
+    encodings = {
+        name: semantics[known].encoding
+        for name, one in resources.items()
+        if isinstance(one.desc, TextureDesc) and one.desc.kind == "texture2d" and one.role not in ("kept", "scene")
+        if (known := name.removesuffix(" kept")) in semantics
+    }
+    found: dict[int, dict[str, bool]] = {}
+    averaged: set[tuple[str, int]] = set()
+    newest: dict[str, int] = {}
+    derived: set[str] = set()  # what has been made from a mean
+    for position, step in enumerate(steps):
+        shows = any(encodings.get(write.resource) == "display" for write in step.writes)
+        for read in step.all_reads:
+            light = shows and not read.previous and encodings.get(read.resource) == "linear"
+            if light and (read.resource, read.version) not in averaged:
+                averaged.add((read.resource, read.version))
+                found.setdefault(position, {})[read.resource] = False
+            if light or (read.resource in derived and not read.previous):
+                derived.update(write.resource for write in step.writes)
+        newest |= {write.resource: write.version for write in step.writes}
+    for name in plan.schedule.outputs.values():
+        encoding = encodings.get(name)
+        if encoding == "linear" and (name, newest.get(name, 0)) not in averaged:
+            found.setdefault(len(steps), {})[name] = False
+        elif encoding == "display" and name not in derived:
+            found.setdefault(len(steps), {})[name] = True
+    return found
+
+
+class LightMeans(Struct, eq=False):
+    """Sums of the light of a frame's moments, which the last moment divides and writes back where it was read.
+
+    Attributes:
+        stops: as from `averaged_textures`.
+        moment, count: the moment that is drawn, from 0, and how many there are.
+    """
+
+    executable: Executable
+    stops: Mapping[int, Mapping[str, bool]]
+    moment: int = 0
+    count: int = 1
+    _sums: dict[str, textures.GpuTexture] = field(default_factory=dict)
+    _programs: dict[tuple[int, str], tuple[Any, Any]] = field(default_factory=dict)
+
+    def calls(self, parity: int) -> dict[int, Call]:
+        """Return what runs before the steps at some positions of the schedule; the last is behind all steps."""
+        return {at: partial(self._add_all, parity, names) for at, names in self.stops.items()}
+
+    def _add_all(self, parity: int, names: Mapping[str, bool]) -> None:
+        executable = self.executable
+        executable.device.raw.glMemoryBarrier(_ALL_BARRIERS)
+        for name, encoded in names.items():
+            source = executable.memory.texture(name, parity)
+            if name not in self._sums:
+                desc = replace(source.desc, format="rgba32f", mips=1)
+                self._sums[name] = textures.create(executable.device, desc, f"the mean of {name}")
+            self._draw(source, self._sums[name], "DECODE" if encoded else "", 1.0, adds=self.moment > 0)
+            if self.moment == self.count - 1:
+                self._draw(self._sums[name], source, "ENCODE" if encoded else "", float(self.count), adds=False)
+        for call in executable.binds[parity]:
+            call()
+
+    def _draw(
+        self, source: textures.GpuTexture, target: textures.GpuTexture, define: str, divisor: float, *, adds: bool
+    ) -> None:
+        device, samples = self.executable.device, source.desc.samples
+        if (samples, define) not in self._programs:
+            program = device.ctx.program(
+                vertex_shader=f"{VERSION}\n{_shader('fullscreen.vert')}",
+                fragment_shader=f"{VERSION}\n#define SAMPLES {samples}\n{f'#define {define} 1' if define else ''}\n"
+                f"{_shader('srgb.glsl')}{_shader('light_mean.frag')}",
+            )
+            self._programs[samples, define] = program, device.ctx.vertex_array(program, [])
+        program, vertex_array = self._programs[samples, define]
+        state = State(blend=ADD if adds else None)
+        calls: list[Callable[[], object]] = [
+            self.executable.memory.framebuffer([Attachment(target, 0, None)], None, target.desc.size).use,
+            *gl_state.changes(None, gl_state.pieces(device.raw, state, depth_test=False, cull="none")),
+            partial(device.raw.glBindTextureUnit, 0, source.glo),
+            partial(device.raw.glBindSampler, 0, 0),
+        ]
+        for call in calls:
+            call()
+        program["divisor"] = divisor
+        vertex_array.render(moderngl.TRIANGLES, 3)
+
+    def release(self) -> None:
+        for texture in self._sums.values():
+            textures.delete(self.executable.device, texture)
+        for each in (one for pair in self._programs.values() for one in pair):
+            each.release()
+
+
+def _shader(name: str) -> str:
+    return (folder("rendergraph.shaders") / "include" / name).read_text(encoding="utf-8")
