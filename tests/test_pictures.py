@@ -19,7 +19,7 @@ sys.modules["draw"] = draw  # where the classes in it look up their annotations
 SPEC.loader.exec_module(draw)
 LIST: Any = draw.read()
 FILES = {file.name for file in (DOCS / "images").iterdir() if file.suffix in (".png", ".svg")}
-NOT_CHECKED = {"--tap", "--frames", "-o"}  # what `check` has no such words for, each with one behind it
+NOT_CHECKED = {"--tap", "--frames", "--subframes", "-o"}  # what `check` has no such words for, each with one behind it
 
 CHECKED: set[tuple[str, ...]] = set()  # many a picture has the same first panel
 

@@ -845,3 +845,15 @@ def test_the_shipped_salamander_is_what_its_program_computes(tmp_path: Path) -> 
     mesh = shipped.meshes[0]
     a, b, c = mesh.positions.astype(float)[mesh.indices].swapaxes(0, 1)
     assert np.einsum("ni,ni->", a, np.cross(b, c)) > 0  # its faces look outwards
+
+
+def test_the_shipped_orrery_is_what_its_program_computes(tmp_path: Path) -> None:
+    """And its clip is closed: after it every planet is where it was."""
+    scenes = Path(__file__).parents[2] / "pipelines/scenes"
+    runpy.run_path(str(scenes / "orrery.py"))["write"](tmp_path / "orrery.glb")
+    assert (tmp_path / "orrery.glb").read_bytes() == (scenes / "orrery.glb").read_bytes()
+    scene = animate.play(load(scenes / "orrery.glb"))
+    first, last = (animate.at(scene, time) for time in (0.0, scene.rigs[0].length - 1e-9))
+    for one, other in zip(first.objects, last.objects, strict=True):
+        np.testing.assert_allclose(other.transform, one.transform, atol=1e-6)
+    assert scene.rigs[0].length == 8
