@@ -1,13 +1,14 @@
 """An orrery: planets on brass arms that turn about a lamp, at different speeds. Writes `orrery.glb` beside it.
 
-Every part is a surface of revolution or a gear. The arms are nodes that turn, a moon's arm is a child of a planet's; all
-are back where they began after one clip. Metres, +Y up, the foot at y = 0.
+Every part is a surface of revolution or a gear. The arms are nodes that turn; a moon's arm is a child of a planet's. After
+one clip all are back where they began. Metres, +Y up, the foot at y = 0.
 """
 
 from __future__ import annotations
 
 import json
 import struct
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -45,16 +46,22 @@ STARTS = (2.6, 4.4, 0.5, 2.45, 5.3)
 """Where the planets are at first, in radians."""
 
 
+def at(x: float, y: float) -> Doubles:
+    return np.array([x, y, 0.0])
+
+
 def lathe(profile: Doubles, around: int = AROUND) -> Mesh:
-    """Return the surface of revolution of (radius, height) pairs about Y, from the top down; each edge has its own normal."""
+    """Return the surface of revolution of (radius, height) pairs about Y, from the top down, with hard edges."""
     angle = np.linspace(0, 2 * np.pi, around + 1)
     circle = np.stack([np.cos(angle), np.zeros_like(angle), -np.sin(angle)], axis=1)
-    positions, normals, faces = [], [], []
-    for (r0, y0), (r1, y1) in zip(profile[:-1], profile[1:], strict=True):
+    positions: list[Doubles] = []
+    normals: list[Doubles] = []
+    faces: list[npt.NDArray[np.int64]] = []
+    for (r0, y0), (r1, y1) in pairwise(profile):
         out = np.array([y0 - y1, r1 - r0]) / np.hypot(y0 - y1, r1 - r0)
-        start = sum(map(len, positions))
-        positions += [r0 * circle + [0, y0, 0], r1 * circle + [0, y1, 0]]
-        normals += [out[0] * circle + [0, out[1], 0]] * 2
+        start = (around + 1) * len(positions)
+        positions += [r0 * circle + at(0, y0), r1 * circle + at(0, y1)]
+        normals += [out[0] * circle + at(0, out[1])] * 2
         a = np.arange(around) + start
         b, c, d = a + 1, a + around + 1, a + around + 2
         faces += [np.stack([a, c, b], axis=1), np.stack([b, c, d], axis=1)]
@@ -64,7 +71,7 @@ def lathe(profile: Doubles, around: int = AROUND) -> Mesh:
 def sphere(radius: float, y: float = 0.0, rows: int = 16) -> Mesh:
     angle = np.linspace(0, np.pi, rows + 1)
     positions, _, faces = lathe(np.stack([radius * np.sin(angle), radius * np.cos(angle)], axis=1), 2 * rows)
-    return positions + [0, y, 0], positions / radius, faces
+    return positions + at(0, y), positions / radius, faces
 
 
 def cylinder(radius: float, low: float, high: float, around: int = AROUND) -> Mesh:
@@ -80,8 +87,10 @@ def gear(teeth: int, radius: float, low: float, high: float) -> Mesh:
     angle = np.linspace(0, 2 * np.pi, 4 * teeth + 1)
     rim = radius + np.where(np.arange(4 * teeth + 1) % 4 < 2, 0.006, -0.006)
     circle = np.stack([rim * np.cos(angle), np.zeros_like(angle), -rim * np.sin(angle)], axis=1)
-    top, bottom = circle + [0, high, 0], circle + [0, low, 0]
-    positions, normals, faces = [], [], []
+    top, bottom = circle + at(0, high), circle + at(0, low)
+    positions: list[Any] = []
+    normals: list[Any] = []
+    faces: list[Any] = []
     for k in range(4 * teeth):
         edge = circle[k + 1] - circle[k]
         out = np.array([-edge[2], 0, edge[0]])
@@ -107,7 +116,7 @@ def moved(mesh: Mesh, x: float, y: float = 0.0, tilt: float = 0.0) -> Mesh:
     positions, normals, faces = mesh
     c, s = np.cos(tilt), np.sin(tilt)
     turn = np.array([[1, 0, 0], [0, c, s], [0, -s, c]])
-    return positions @ turn + [x, y, 0], normals @ turn, faces
+    return positions @ turn + at(x, y), normals @ turn, faces
 
 
 def joined(parts: list[Mesh]) -> Mesh:
@@ -167,7 +176,8 @@ def document() -> tuple[dict[str, Any], bytes]:
         return len(accessors) - 1
 
     top: dict[str, Any] = {"asset": {"version": "2.0", "generator": "orrery.py"}, "meshes": [], "nodes": []}
-    samplers, channels = [], []
+    samplers: list[Any] = []
+    channels: list[Any] = []
     names = list(MATERIALS)
     for number, node in enumerate(nodes()):
         primitives = []
