@@ -1,7 +1,7 @@
 """An orrery: planets on brass arms that turn about a lamp, at different speeds. Writes `orrery.glb` beside it.
 
-Every part is a surface of revolution or a gear. The arms are nodes that turn; a moon's arm is a child of a planet's. After
-one clip all are back where they began. Metres, +Y up, the foot at y = 0.
+Every part is a surface of revolution or a gear. The arms are nodes that turn; a moon's arm is a child of a planet's.
+After one clip all are back where they began. Metres, +Y up, the foot at y = 0.
 """
 
 from __future__ import annotations
