@@ -75,8 +75,10 @@ class ImageLighting(SurfaceLighting):
 
     def draw_layered(self, steps: Steps) -> None:
         """Light again the opaque surfaces that have layers, such as a coat: a G-buffer has none."""
-        objects = [one.name for one in steps.facts.objects if one.layers and not one.blended and not one.hidden]
-        if not objects or not {"phong", "nothing"}.isdisjoint(steps.needs("shading")):
+        is_physical = {"phong", "nothing"}.isdisjoint(steps.needs("shading"))
+        layered = [one for one in steps.facts.objects if one.layers and not one.blended and not one.hidden]
+        objects = [one.name for one in layered if is_physical or "shadow_catcher" in one.layers]
+        if not objects:
             return
         reads = self.direct_reads(steps) | self.ambient_reads(steps) | self.air_reads(steps) | self.energy_reads(steps)
         steps.geometry(
@@ -87,7 +89,8 @@ class ImageLighting(SurfaceLighting):
             state=State(depth_write=False),
             label="layered",
             depth=self.depth.tested(),
-            **reads | self.layer_reads(steps),
+            defines=self.catcher_defines(steps),
+            **reads | self.layer_reads(steps) | self.catcher_reads(steps),
         )
 
     def draw_backdrop_and_transparent(self, steps: Steps) -> None:

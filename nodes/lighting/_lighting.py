@@ -371,6 +371,21 @@ class SurfaceLighting(Lighting):
             reads |= {"brdf_table": self.brdf_table.sampled("linear"), **reflections}
         return reads
 
+    def catcher_reads(self, steps: Steps) -> dict[str, Any]:
+        """Return what a shader reads to show on shadow catchers what is behind them; nothing without any."""
+        if not has_layer(steps.facts, "shadow_catcher"):
+            return {}
+        if shows_environment(self, steps.facts):
+            return self.environment_reads(steps) | {"environment": self.environment}
+        plain = {"background": background_color(self)} if isinstance(self, GeometryLighting) else {}
+        return self.environment_reads(steps) | plain
+
+    def catcher_defines(self, steps: Steps) -> dict[str, int]:
+        """Return the macros of a shader that draws shadow catchers."""
+        if not has_layer(steps.facts, "shadow_catcher") or not shows_environment(self, steps.facts):
+            return {}
+        return {"SHOWS_ENVIRONMENT": 1, **({"BLURRED": 1} if self.backdrop_blur > 0 else {})}
+
     def draw_backdrop(self, steps: Steps, view: Port | None = None) -> None:
         """Show the environment, or the background behind air, where no surface covers the picture.
 
@@ -485,8 +500,9 @@ class GeometryLighting(SurfaceLighting):
         if options.get("per_light") is None:
             reads |= self.light_list_reads(steps)
         # `lookup` in any case: a step without reads would read all inputs.
-        reads = {"lookup": self.lookup, **reads, **options}
-        steps.geometry(fragment, out=self.targets(steps), objects="opaque", **reads)
+        reads = {"lookup": self.lookup, **reads, **self.catcher_reads(steps), **options}
+        defines = {**self.catcher_defines(steps), **reads.pop("defines", {})}
+        steps.geometry(fragment, out=self.targets(steps), objects="opaque", defines=defines, **reads)
 
     def draw_backdrop_and_transparent(self, steps: Steps, **shaders: Any) -> None:
         """Draw the environment behind the opaque surfaces, then transparent surfaces over both."""

@@ -47,13 +47,33 @@ def light_views(light: Any, scene: Any, camera: ViewMatrices, resolution: int) -
         camera: the camera's view.
         resolution: texels along a side.
     """
-    box = np.asarray(scene.bounds, np.float64)
+    box = receiving_box(scene, light)
     if light.type == "directional":
         casting = casting_points(scene, light.direction)
         return (directional_view(light.direction, camera, box, casting, resolution),)
     if light.type == "spot":
         return (spot_view(light, scene, camera, resolution),)
     return point_views(light, box, resolution)
+
+
+def receiving_box(scene: Any, light: Any) -> Points:
+    """Return the box around all surfaces and around their shadows on shadow catchers, which are no part of `bounds`.
+
+    The corners of the scene's bounds are moved along the light down to the lowest catcher, and not beyond catchers.
+    """
+    box = np.asarray(scene.bounds, np.float64)
+    if not len(scene.catchers):
+        return box
+    catching = scene.corners[scene.catchers].reshape(-1, 3)
+    low, high = catching.min(axis=0), catching.max(axis=0)
+    corners = projection.box_corners(box)
+    along = np.asarray(light.direction) if light.type == "directional" else corners - np.asarray(light.position)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        steps = (low[1] - corners[:, 1:2]) / np.broadcast_to(along, corners.shape)[:, 1:2]
+        shadows = corners + np.where(steps > 0, np.minimum(steps, 1e9), 0.0) * along
+    shadows = np.clip(shadows, np.minimum(low, box[0]), np.maximum(high, box[1]))
+    everything = np.concatenate([corners, shadows])
+    return np.stack([everything.min(axis=0), everything.max(axis=0)])
 
 
 def directional_view(
@@ -87,7 +107,7 @@ def spot_view(light: Any, scene: Any, camera: ViewMatrices, resolution: int) -> 
     Perpendicular to the light's axis it is the intersection of the visible part of the cone and the casters. Along the
     axis it begins at the nearest caster and ends at the farthest visible point.
     """
-    box = np.asarray(scene.bounds, np.float64)
+    box = receiving_box(scene, light)
     half_angle = min(light.outer, _MAX_HALF_ANGLE)
     cone = projection.cone_view(light.position, light.direction, half_angle, *distance_range(light, box), resolution)
     planes = projection.frustum_planes(cone)

@@ -11,7 +11,7 @@ import numpy as np
 from rendergraph.api import Frame, ViewMatrices, param, structural
 
 from ._cascades import bounding_sphere, cascade_view, farthest_visible, overlapping_spans, split_distances
-from ._light_views import casting_points
+from ._light_views import casting_points, receiving_box
 from .shadow_map import ShadowMapNode
 
 
@@ -45,7 +45,7 @@ class ShadowCascaded(ShadowMapNode):
         """Return the views of one light: of a directional light one per cascade."""
         if light.type != "directional":
             return super().light_views(light, frame)
-        camera, box = self.eye(frame), np.asarray(frame.scene.bounds, np.float64)
+        camera, box = self.eye(frame), receiving_box(frame.scene, light)
         far = max(self.reach, 2 * camera.near) if self.reach else farthest_visible(camera, box)
         distances = split_distances(camera.near, far, self.cascades, self.weight)
         spans = overlapping_spans(distances, self.blend)

@@ -23,7 +23,7 @@ from rendergraph.api import (
     structural,
 )
 
-from ._light_views import distance_range
+from ._light_views import distance_range, receiving_box
 from ._map_technique import MapTechnique
 
 _FACES = ((0, 1, 2, -1), (0, -1, 2, 1), (1, 1, 0, 1), (1, -1, 0, 1), (2, 1, 0, 1), (2, -1, 0, -1))
@@ -94,7 +94,7 @@ class ShadowCubeMap(MapTechnique):
         facts = Facts((1, 1), lights=tuple(scene.lights))
         for index in point_lights(self, facts):
             light = scene.lights[index]
-            near, far = distance_range(light, np.asarray(scene.bounds, np.float64))
+            near, far = distance_range(light, receiving_box(scene, light))
             perspective = projection.perspective(math.pi / 2, 1.0, near, far)
             views = []
             for axis, sign, right_axis, right_sign in _FACES:

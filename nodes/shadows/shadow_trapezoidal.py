@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from rendergraph.api import Frame, ViewMatrices, param, projection
 
+from ._light_views import receiving_box
 from ._trapezoid import warp_view
 from .shadow_map import ShadowMapNode
 
@@ -37,5 +36,5 @@ class ShadowTrapezoidal(ShadowMapNode):
         if light.type == "point":
             return views
         eye = self.eye(frame)
-        visible = projection.visible_part(eye, np.asarray(frame.scene.bounds, np.float64))
+        visible = projection.visible_part(eye, receiving_box(frame.scene, light))
         return [warp_view(view, visible, eye, self.focus, _MARGIN) for view in views]

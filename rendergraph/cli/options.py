@@ -267,6 +267,9 @@ SELECTION_OPTIONS = {
         shell_complete=offered("environments"),
         help="Environment map: a shipped name, .hdr or .exr, or `none` for the file's own lights alone.",
     ),
+    "ground": click.option(
+        "--ground", is_flag=True, help="Put a ground below the scene that shows the environment and receives shadows."
+    ),
     "size": click.option("--size", type=SIZE, metavar="WxH", help="Size of the picture in pixels."),
     "sets": click.option(
         "-s",

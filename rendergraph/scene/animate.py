@@ -17,7 +17,7 @@ from rendergraph.scene import scene_values
 from rendergraph.scene.cameras import WIDE, bounding_sphere, described_camera, framing_camera
 from rendergraph.scene.geometry import rigid, translation
 from rendergraph.scene.model import Matrix, Placement, Scene
-from rendergraph.scene.surroundings import lit
+from rendergraph.scene.surroundings import grounded, lit
 
 if TYPE_CHECKING:
     from rendergraph.scene.rig import Pose
@@ -34,7 +34,7 @@ def complete(
     bare: bool = False,
     shutter: float | None = None,
 ) -> Scene:
-    """Return the scene with a camera and with light (`surroundings.lit`); the chosen camera comes first.
+    """Return the scene with a camera and with light and ground (`surroundings`); the chosen camera comes first.
 
     Call it once, before `at`: the added light stays in place while the camera moves.
 
@@ -59,7 +59,7 @@ def complete(
             raise InputError(Problem("RG322", text, Place(Option("--camera", camera_name))))
         cameras = {camera_name: cameras[camera_name], **cameras}
     first = next(iter(cameras.values()))
-    return lit(replace(scene, cameras=cameras), first, bare=bare)
+    return grounded(lit(replace(scene, cameras=cameras), first, bare=bare))
 
 
 def moves(scene: Scene) -> bool:

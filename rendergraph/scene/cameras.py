@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 FRAMING_DIRECTION = (1.0, 0.6, 1.5)
 FRAMING_FOV = math.radians(45.0)
 WIDE = 16 / 9
+MOST_POINTS = 1 << 24
+"""Number of placed vertices above which the boxes of their meshes are measured instead."""
 _MARGIN = 0.94
 """How much of the picture is filled where something touches it."""
 _BLOCK = 1 << 16
@@ -88,7 +90,7 @@ def bounding_sphere(scene: Scene) -> tuple[Vec3, float]:
     return vec3((low + high) / 2), max(float(np.linalg.norm(high - low)) / 2, 1e-6)
 
 
-def framing_camera(scene: Scene, aspect: float = WIDE, most_points: int = 1 << 24) -> Camera:
+def framing_camera(scene: Scene, aspect: float = WIDE, most_points: int = MOST_POINTS) -> Camera:
     """Frame everything drawn from (1, 0.6, 1.5), 45° high, from as near as its own points allow.
 
     The camera looks along that direction, off-centre if that brings it nearer. Each side of the view is determined by
@@ -114,6 +116,11 @@ def framing_camera(scene: Scene, aspect: float = WIDE, most_points: int = 1 << 2
     target = vec3(eye - axes[2] * away)
     near = min(0.1 * radius, 0.5 * nearest)
     return Camera("default", transform, fov_y=FRAMING_FOV, near=near, far=20 * radius, target=target)
+
+
+def lowest_point(scene: Scene) -> float:
+    """Return the least y of everything drawn, in metres."""
+    return -float(_reaches(scene, np.array([(0.0, -1.0, 0.0)]), np.zeros(3), MOST_POINTS)[0])
 
 
 @cache

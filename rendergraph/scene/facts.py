@@ -152,8 +152,15 @@ class FrameScene:
         return np.array([entry.casts_shadow and not entry.hidden for entry in self.objects], bool)
 
     @cached_property
+    def catchers(self) -> npt.NDArray[np.int64]:
+        catching = [self.materials[placed.material].shadow_catcher for placed in self.objects]
+        return np.flatnonzero(catching & self.shown)
+
+    @cached_property
     def bounds(self) -> tuple[Vec3, Vec3]:
-        shown = self.corners if self.shown.all() else self.corners[self.shown]
+        counts = self.shown.copy()
+        counts[self.catchers] = False
+        shown = self.corners if counts.all() else self.corners[counts]
         if not len(shown):
             return (-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)
         (x, y, z), (u, v, w) = shown.min(axis=(0, 1)).tolist(), shown.max(axis=(0, 1)).tolist()

@@ -38,7 +38,8 @@ T = TypeVar("T", bound=np.floating[Any])
 FARTHEST = 1e12
 """No number of a mesh is larger: products of a few would leave single precision."""
 
-_LAYERS = {key: key.removesuffix("_color") for key in ("clearcoat", "sheen_color", "iridescence", "transmission")}
+_LAYERED = ("clearcoat", "sheen_color", "iridescence", "transmission", "shadow_catcher")
+_LAYERS = {key: key.removesuffix("_color") for key in _LAYERED}
 _REFLECTANCE = ("ior", "specular", "specular_color")
 _MOST_CONVEX = 10_000_000
 """Pairs of vertex and triangle that are looked at to see whether a mesh is convex: about a tenth of a second."""
@@ -222,6 +223,7 @@ class Material(Struct, frozen=True):
         clearcoat, sheen_color, iridescence, transmission: factors of the layers, with what belongs to each, as in the
             KHR_materials_ extensions; distances in metres, `iridescence_thickness` in nanometres where its texture
             is 0 and 1 (without one the second counts).
+        shadow_catcher: shows what is behind it, as dark as shadows and occlusion make it.
         textures: by slot: `base_color`, `metallic_roughness`, `normal`, `occlusion`, `emissive`, `anisotropy`,
             `specular`, `specular_color`, and those of the layers.
         ambient, diffuse, specular_phong, shininess: an OBJ's Ka, Kd, Ks, Ns where the MTL gives no Pr/Pm; None where
@@ -258,6 +260,7 @@ class Material(Struct, frozen=True):
     attenuation_distance: float = float("inf")
     attenuation_color: Vec3 = (1.0, 1.0, 1.0)
     dispersion: float = 0.0
+    shadow_catcher: bool = False
     textures: Mapping[str, Texture] = field(default_factory=dict)
     ambient: Vec3 | None = None
     diffuse: Vec3 | None = None
@@ -350,6 +353,8 @@ class Environment(Struct, frozen=True):
         intensity: factor on its radiance.
         rotate: radians about +Y.
         sun: the sun of a sky, in the directions of the image, for a scene that has no directional light; else None.
+        projection: the point from which shadow catchers show the image, x, y and z in metres, and the distance from
+            there at which they show it as the background does; all 0 if they do everywhere.
     """
 
     image: ImageSource | MadeImage
@@ -357,6 +362,7 @@ class Environment(Struct, frozen=True):
     intensity: float = 1.0
     rotate: float = 0.0
     sun: Light | None = None
+    projection: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
     @property
     def sunlight(self) -> Light | None:
@@ -397,6 +403,8 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         copies: section and name of a scene file's entry to its `repeat.Copies`.
         plugin_keys: section to the names of the plugins' keys that its file may use.
         files: every file accessed while reading it, as it was.
+        ground: whether to add a ground, and from which height the environment is projected on it, in metres; 0 suits
+            the objects.
     """
 
     name: str
@@ -416,11 +424,15 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
     plugin_keys: Mapping[str, frozenset[str]] = field(default_factory=dict)
     rigs: tuple[Rig, ...] = ()
     files: Stamps = field(default_factory=dict)
+    ground: float | None = None
 
     @cached_property
     def bounds(self) -> tuple[Vec3, Vec3]:
-        """Least and greatest corner of the transformed boxes of everything drawn; a unit cube if nothing is."""
-        shown = [entry for entry in self.objects if not entry.hidden]
+        """Least and greatest corner of the transformed boxes of everything drawn; a unit cube if nothing is.
+
+        Shadow catchers do not count: a ground is as large as the surroundings.
+        """
+        shown = [entry for entry in self.objects if not (entry.hidden or self.materials[entry.material].shadow_catcher)]
         if not shown:
             return (-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)
         transforms, (low, high) = np.array([entry.transform for entry in shown]), boxes_of(self.meshes, shown)

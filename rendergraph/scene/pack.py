@@ -50,7 +50,7 @@ MATERIAL = np.dtype([(name, *_VEC4) for name in _MATERIAL_ROWS.split()])
 _LAYER_ROWS = "clearcoat sheen iridescence transmission absorption"
 LAYERED_MATERIAL = np.dtype([(name, *_VEC4) for name in (*_MATERIAL_ROWS.split(), *_LAYER_ROWS.split())])
 """The records of scenes where some material has a layer (`LAYERED_MATERIALS`)."""
-ENVIRONMENT = np.dtype([("environment_transform", *_VEC4)])
+ENVIRONMENT = np.dtype([(name, *_VEC4) for name in ("environment_transform", "environment_projection")])
 LIGHT = np.dtype([(name, *_VEC4) for name in ("position", "color", "direction", "cone")])
 _MATRICES = "view projection view_projection inverse_view inverse_projection inverse_view_projection"
 _MATRIX = ("<f4", (4, 4))
@@ -319,10 +319,11 @@ def reversed_projection(view: ViewMatrices) -> Matrix:
 
 
 def pack_environment(environment: Environment | None) -> Records:
-    """The `environment_block` (shaders/include/environment.glsl): cosine and sine of its turn, and a factor."""
+    """The `environment_block` (shaders/include/environment.glsl): its turn, a factor, and its projection."""
     turn, intensity = (environment.rotate, environment.intensity) if environment is not None else (0.0, 1.0)
     record = np.zeros(1, ENVIRONMENT)
     record["environment_transform"] = (np.cos(turn), np.sin(turn), intensity, 0.0)
+    record["environment_projection"] = environment.projection if environment is not None else 0.0
     return record
 
 

@@ -23,7 +23,7 @@ from rendergraph.textures import FORMATS, TextureDesc
 
 _FLAGS = (
     *("casts_shadow", "hidden", "double_sided", "masked", "blended", "mirrored", "unlit"),
-    *("has_tangents", "has_uv0", "has_uv1"),
+    *("has_tangents", "has_uv0", "has_uv1", "shadow_catcher"),
 )
 FLAGS = {name: 1 << bit for bit, name in enumerate(_FLAGS)}
 """Bits of an instance's flags, in GLSL `SCENE_CASTS_SHADOW` and so on."""
@@ -194,6 +194,8 @@ def data_macros(scene: Scene, packed: PackedScene, arrays: TextureArrays) -> dic
     for mode, name in (("mask", "SCENE_ANY_MASKED"), ("blend", "SCENE_ANY_BLENDED")):
         if mode in packed.alpha_mode:
             macros[name] = "1"
+    if any(material.shadow_catcher for material in scene.materials):
+        macros["SCENE_ANY_SHADOW_CATCHER"] = "1"
     if packed.material_moved.any():
         macros["HAS_UV_TRANSFORM"] = "1"
     return macros
@@ -245,6 +247,7 @@ def _flags(scene: Scene, number: int, packed: PackedScene) -> int:
         "has_tangents": mesh.tangents is not None and ("normal" in material.textures or scene.has_grain(material)),
         "has_uv0": mesh.uv0 is not None,
         "has_uv1": mesh.uv1 is not None,
+        "shadow_catcher": material.shadow_catcher,
     }
     return reduce(or_, (FLAGS[name] for name, yes in holds.items() if yes), 0)
 

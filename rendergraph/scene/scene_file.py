@@ -147,6 +147,7 @@ class _Reader:
         self.plugin_keys: dict[str, frozenset[str]] = {}
         self.kinds: Mapping[str, TextureKind] = SHIPPED_TEXTURES
         self.vertices = 0
+        self.ground: float | None = None
 
     def read(self, root: Value) -> Scene:
         """The scene; only to be used if no problem was found."""
@@ -177,6 +178,7 @@ class _Reader:
             copies=self.copies,
             plugin_keys=self.plugin_keys,
             rigs=tuple(self.rigs),
+            ground=self.ground,
         )
 
     def _add_plugin_keys(self, root: Value) -> None:
@@ -331,7 +333,15 @@ class _Reader:
 
     def _environment(self, entry: Value | None) -> Environment | None:
         values = plain(entry, scene_keys.ENVIRONMENT) if entry is not None else {}
-        if entry is None or "file" not in values:
+        if entry is None:
+            return None
+        if values.get("ground"):
+            self.ground = values.get("ground_height", 0.0)
+        if "file" not in values:
+            lone = [key for key in values if key not in ("ground", "ground_height")]
+            if lone or not values.get("ground"):
+                key = entry.get(lone[0]) if lone else None
+                self.validator.report(key or entry, "RG321", "'environment' needs a 'file', or `ground: true`")
             return None
         self.recipe["environment", ""] = values
         place, file = _value(entry, "file"), values["file"]

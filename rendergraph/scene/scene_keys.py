@@ -202,6 +202,7 @@ MATERIAL = Table(
         Key("attenuation_distance", LENGTH, "Where `attenuation_color` is left; none by default.", None, "m"),
         Key("attenuation_color", color(1), "What is left of white light after that distance.", (1.0, 1.0, 1.0)),
         Key("dispersion", number(0), "20 / Abbe number: how far colours are refracted apart.", 0.0),
+        Key("shadow_catcher", bool, "Shows what is behind it, as dark as shadows and occlusion make it.", False),
         Key("ambient", color(1), "ka of the empirical models; the base colour by default."),
         Key("diffuse", color(1), "kd of the empirical models; base (1 − metallic) by default."),
         Key("specular_phong", color(1), "ks of the empirical models; f0 by default."),
@@ -254,7 +255,7 @@ CAMERA = Table(
 ENVIRONMENT = Table(
     "environment",
     (
-        Key("file", FILE, "Equirectangular image (.hdr, .exr), or a shipped one, such as `sky`.", required=True),
+        Key("file", FILE, "Equirectangular image (.hdr, .exr), or a shipped one, such as `sky`."),
         Key("intensity", number(0), "Factor on its radiance.", 1.0),
         Key("rotate_degrees", number(), "Turns it about +Y.", 0.0, "°"),
         Key(
@@ -270,6 +271,8 @@ ENVIRONMENT = Table(
         Key("time", TIME, "With `place`: date and time for the sun, with its offset from UTC."),
         Key("turbidity", number(1, 10), "With a sky: haze, from 1 for clean air.", 1.3),
         Key("overcast", number(0, 1), "With a sky: clouds, which hide the sun at 1.", 0.0),
+        Key("ground", bool, "Puts a ground below the objects that shows the image and receives shadows.", False),
+        Key("ground_height", LENGTH, "With `ground`: where the image was taken; suits the objects by default.", None, "m"),
     ),
 )
 SKY_KEYS = ("sun", "elevation_degrees", "azimuth_degrees", "place", "time", "turbidity", "overcast")

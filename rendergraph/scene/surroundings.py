@@ -1,4 +1,4 @@
-"""What lights a scene that does not say it: a key light and the studio, at levels that suit its own lights."""
+"""What a scene does not say of its surroundings: a key light and the studio, at suitable levels, and a ground."""
 
 from __future__ import annotations
 
@@ -8,15 +8,21 @@ from msgspec.structs import replace
 
 from rendergraph.errors import Place, Problem
 from rendergraph.projection import unit
+from rendergraph.scene.cameras import lowest_point
 from rendergraph.scene.environments import shipped
 from rendergraph.scene.geometry import vec3
-from rendergraph.scene.model import Camera, Light, Scene
+from rendergraph.scene.model import Camera, Light, Material, Mesh, Object, Scene
 
 KEY_LUX = 3.0
 STUDIO_FILL = 0.6
 """Intensity of the studio beside a key light: at full strength, both together overexpose a white surface."""
 MOST_CHANGE = 8.0
 """Lights that illuminate by less or more than `KEY_LUX` by this factor are in other units, and are scaled."""
+GROUND = Material("ground", base_color=(0.3, 0.3, 0.3, 1.0), roughness=0.35, shadow_catcher=True)
+GROUND_EXTENT = 12.0
+"""From the middle to the sides of the ground, where nothing is to be seen of it, as a multiple of the objects' radius."""
+GROUND_HEIGHT = 1.5
+"""Height from which the environment is projected on the ground, likewise."""
 _BRIGHT = 90  # percentile of the illuminance of surfaces: what is well lit, without the vertices beside a lamp
 _MOST_POINTS = 4096
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -31,12 +37,45 @@ def key_light(scene: Scene, camera: Camera) -> Light:
     )
 
 
+def grounded(scene: Scene) -> Scene:
+    """Return the scene with a ground that touches its lowest point, if it wants one.
+
+    The ground is a square that casts no shadow and catches those of others. It shows the environment from a point above
+    the middle of the objects, and towards its sides more and more as the background does, so that no edge is seen.
+    """
+    if scene.ground is None:
+        return scene
+    low, high = (np.array(corner) for corner in scene.bounds)
+    center, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+    half = GROUND_EXTENT * radius
+    center[1] = lowest_point(scene) - 1e-4 * radius  # not in the plane of what stands on it
+    corners = np.array([(-half, 0, -half), (-half, 0, half), (half, 0, half), (half, 0, -half)], np.float32)
+    normals = np.tile(np.array([(0, 1, 0)], np.float32), (4, 1))
+    mesh = Mesh("ground", corners, np.array([(0, 1, 2), (0, 2, 3)], np.uint32), normals)
+    transform = np.eye(4)
+    transform[:3, 3] = center
+    taken = {placed.name for placed in scene.objects}
+    name = next(name for name in ("ground", "environment_ground") if name not in taken)
+    placed = Object(name, len(scene.meshes), len(scene.materials), transform, casts_shadow=False, node=name)
+    environment = scene.environment
+    if environment is not None:
+        x, y, z = center.tolist()
+        environment = replace(environment, projection=(x, y + (scene.ground or GROUND_HEIGHT * radius), z, half))
+    return replace(
+        scene,
+        objects=(*scene.objects, placed),
+        meshes=(*scene.meshes, mesh),
+        materials=(*scene.materials, GROUND),
+        environment=environment,
+    )
+
+
 def lit(scene: Scene, camera: Camera, *, bare: bool = False) -> Scene:
     """Return the scene with light; `bare` adds no surroundings.
 
     A sky brings its sun, if the scene has no directional light. A scene with neither lights nor an environment gets a
     key light and the `studio`. A mesh file cannot say what is around it, so the studio also fills the shadows of its
-    own lights. Files in photometric units have lights that are thousands of times brighter: all of them are scaled by
+    own lights, and those of a scene that wants a ground. Files in photometric units have lights that are thousands of times brighter: all of them are scaled by
     one factor, with a warning.
     """
     studio = shipped("studio")
@@ -47,6 +86,8 @@ def lit(scene: Scene, camera: Camera, *, bare: bool = False) -> Scene:
         name = "sun" if all(light.name != "sun" for light in scene.lights) else "sky_sun"
         return replace(scene, lights=(*scene.lights, replace(sun, name=name)))
     if bare or scene.source is None or scene.source.suffix.lower() in (".yaml", ".yml"):
+        if not bare and scene.ground is not None and scene.environment is None:
+            return replace(scene, environment=replace(studio, intensity=STUDIO_FILL))
         return scene
     level = typical_illuminance(scene)
     if level > 0 and not KEY_LUX / MOST_CHANGE < level < KEY_LUX * MOST_CHANGE:

@@ -35,6 +35,7 @@ def load(
     *,
     scene: str | Path | Mapping[str, Any] | None = None,
     environment: str | Path | npt.NDArray[Any] | None = None,
+    ground: bool = False,
     camera: str | None = None,
     size: tuple[int, int] | None = None,
     sets: Sequence[str] = (),
@@ -53,6 +54,7 @@ def load(
     pipeline = Pipeline(
         Selection(
             source=source if isinstance(source, Mapping) else str(source),
+            ground=ground,
             camera=camera,
             size=size,
             sets=each_of(sets),

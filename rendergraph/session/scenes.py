@@ -31,7 +31,7 @@ def scene_of(resolved: Resolved) -> Scene:
     changes = spec.scene_changes
     roots = spec.roots.folders if spec.scene is not None or changes is not None else ()
     key: tuple[Any, ...] = (Path.cwd(), spec.scene, selection.environment, selection.camera, roots, limits)
-    key = (*key, selection.shutter, selection.plugins, changes and (spec.path, flow(changes)))
+    key = (*key, selection.ground, selection.shutter, selection.plugins, changes and (spec.path, flow(changes)))
     # One camera serves pictures of about one shape, such as a viewer's smaller ones.
     shape = max(math.floor(10 * spec.size[0] / spec.size[1] + 0.1), 1) / 10
     found = _IN_USE.get(key) or _IN_USE.get((*key, shape))
@@ -47,6 +47,8 @@ def scene_of(resolved: Resolved) -> Scene:
             scene = replace(scene, environment=None)
         elif selection.environment is not None:
             scene = replace(scene, environment=_environment(selection.environment, scene, limits, extensions))
+        if selection.ground and scene.ground is None:
+            scene = replace(scene, ground=0.0)
         scene = _measured(scene, limits)
     framed = () if scene.cameras else (shape,)
     _IN_USE[(*key, *framed)] = made = replace(

@@ -33,6 +33,7 @@ class Selection(Struct, frozen=True):
         source: a shipped name (`forward`), a path, YAML text of several lines, or a mapping with the keys of a file.
         scene, size: override the file's; `size` is width and height in pixels.
         environment: an equirectangular image that replaces the scene's.
+        ground: whether a ground is put below the scene's objects, also where its file asks for none.
         camera: name of the scene's camera; its first by default.
         shutter: overrides the cameras': how much of a frame's time it is open, 0 to 1.
         sets: values of `-s`, such as `ao.radius=0.8`.
@@ -48,6 +49,7 @@ class Selection(Struct, frozen=True):
     camera: str | None = None
     shutter: float | None = None
     environment: Path | None = None
+    ground: bool = False
     size: tuple[int, int] | None = None
     sets: tuple[str, ...] = ()
     patches: tuple[Path | Mapping[str, Any], ...] = ()

@@ -70,6 +70,7 @@ def resolve(selection: Selection, catalog: Catalog | None = None, document: Docu
             selection,
             camera=selection.camera or picture.camera,
             environment=selection.environment or _environment(selection, picture),
+            ground=selection.ground or picture.ground,
         )
     spec = rendergraph.resolve.resolve(
         source,

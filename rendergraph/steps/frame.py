@@ -54,7 +54,12 @@ class FrameScene(Protocol):
 
     @property
     def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """Minimum and maximum corner of all visible objects."""
+        """Minimum and maximum corner of all visible objects but shadow catchers."""
+        ...
+
+    @property
+    def catchers(self) -> npt.NDArray[np.int64]:
+        """Numbers of the visible shadow catchers, (n,)."""
         ...
 
     @property

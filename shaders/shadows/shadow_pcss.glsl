@@ -23,7 +23,7 @@ float penumbra_width(View view, float blocker, float receiver) {
 // Depth of the map (x) and of the receiver's plane (y) at an offset in texels.
 vec2 map_and_receiver_depth(int layer, vec3 coords, vec2 offset, vec2 map_size) {
     vec3 tap = vec3(coords.xy + offset / map_size, float(layer));
-    return vec2(textureLod(shadow_map, tap, 0.0).r, coords.z + dot(offset, map_slope));
+    return vec2(textureLod(shadow_map, tap, 0.0).r, max(coords.z + dot(offset, map_slope), 0.0));
 }
 
 // Bilinearly weighted depth test at an offset in texels.
@@ -31,7 +31,7 @@ float bilinear_test(int layer, vec3 coords, vec2 offset, vec2 map_size) {
     vec2 texel_coords = coords.xy * map_size + offset - 0.5;
     vec2 weights = fract(texel_coords);
     vec4 depths = textureGather(shadow_map, vec3((floor(texel_coords) + 1.0) / map_size, float(layer)));
-    float receiver = coords.z + dot(offset, map_slope);
+    float receiver = max(coords.z + dot(offset, map_slope), 0.0);  // nothing is behind the far plane
     vec4 tests = vec4(1.0);
     for (int i = 0; i < 4; ++i) tests[i] = nearer(depths[i], receiver) ? 0.0 : 1.0;
     vec2 rows = mix(tests.wx, tests.zy, weights.x);

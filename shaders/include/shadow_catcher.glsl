@@ -1,0 +1,52 @@
+// Shadow catchers: surfaces that show what is behind them, as dark as the shadows and the occlusion on them. A catcher
+// is a diffuse surface whose reflectance is such that it reflects just that where nothing shadows it: all techniques of
+// shadows, occlusion and indirect light apply to it (P. Debevec, "Rendering Synthetic Objects into Real Scenes", 1998).
+#include <environment.glsl>
+#include <lights.glsl>
+#include <surface.glsl>
+
+const float CATCHER_F0 = 0.04, CATCHER_F90 = 0.4;  // reflectance straight on and at grazing angles
+
+// How far a catcher shows the environment as the background does: 0 near the point of projection, 1 from its distance
+// on, and without a projection.
+float catcher_fade(vec3 position) {
+    float reach = environment_projection.w;
+    return reach > 0.0 ? smoothstep(0.3, 1.0, length(position.xz - environment_projection.xz) / reach) : 1.0;
+}
+
+// Direction of the environment that a catcher shows to a ray of this unit direction.
+vec3 caught_direction(vec3 position, vec3 ray) {
+    vec3 projected = position - environment_projection.xyz;
+    return normalize(mix(normalize(projected), ray, catcher_fade(position)));
+}
+
+// Fraction of the light that a catcher reflects like a polished floor: slightly, more at grazing angles.
+float catcher_reflectance(Surface s) {
+    float grazing = 1.0 - clamp(dot(s.normal, s.view_dir), 0.0, 1.0), square = grazing * grazing;
+    return mix(CATCHER_F0, CATCHER_F90, square * square * grazing) * (1.0 - catcher_fade(s.position));
+}
+
+// Makes a catcher the surface that reflects `shown` where nothing shadows it. `from_all_sides` is the irradiance / π of
+// the environment or the constant ambient light. Shadows fade out together with the projection, if there is one.
+void catch_shadows(inout Surface s, vec3 shown, vec3 from_all_sides) {
+    vec3 unshadowed = from_all_sides;
+#ifdef NEEDS_PHONG  // empirical models reflect kd of the irradiance of lights, without 1/π
+    const float scale = 1.0;
+#else
+    const float scale = 1.0 / PI;
+#endif
+#if LIGHT_COUNT > 0 && !defined(NO_LIGHTS)
+    for (int i = 0; i < LIGHT_COUNT; ++i) {
+        vec3 light_dir;
+        vec3 irradiance = irradiance_from(lights[i], s.position, light_dir);
+        unshadowed += irradiance * (max(dot(s.normal, light_dir), 0.0) * scale);
+    }
+#endif
+    float fade = environment_projection.w > 0.0 ? catcher_fade(s.position) : 0.0;
+    s.base_color = shown;
+    s.diffuse = shown * (1.0 - fade) / max(unshadowed, 1e-6);
+    s.ambient = s.diffuse;
+    s.emissive = shown * fade;
+    s.f0 = vec3(0.0);
+    s.f90 = 0.0;
+}
