@@ -18,10 +18,10 @@ STUDIO_FILL = 0.6
 """Intensity of the studio beside a key light: at full strength, both together overexpose a white surface."""
 MOST_CHANGE = 8.0
 """Lights that illuminate by less or more than `KEY_LUX` by this factor are in other units, and are scaled."""
-GROUND = Material("ground", base_color=(0.3, 0.3, 0.3, 1.0), roughness=0.35, shadow_catcher=True)
+GROUND = Material("ground", base_color=(0.3, 0.3, 0.3, 1.0), roughness=0.2, shadow_catcher=True)
 GROUND_EXTENT = 12.0
 """From the middle to the sides of the ground, where nothing is to be seen of it, as a multiple of the objects' radius."""
-GROUND_HEIGHT = 1.5
+GROUND_HEIGHT = 2.5
 """Height from which the environment is projected on the ground, likewise."""
 _BRIGHT = 90  # percentile of the illuminance of surfaces: what is well lit, without the vertices beside a lamp
 _MOST_POINTS = 4096

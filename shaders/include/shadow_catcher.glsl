@@ -26,10 +26,10 @@ float catcher_reflectance(Surface s) {
     return mix(CATCHER_F0, CATCHER_F90, square * square * grazing) * (1.0 - catcher_fade(s.position));
 }
 
-// Makes a catcher the surface that reflects `shown` where nothing shadows it. `from_all_sides` is the irradiance / π of
-// the environment or the constant ambient light. Shadows fade out together with the projection, if there is one.
-void catch_shadows(inout Surface s, vec3 shown, vec3 from_all_sides) {
-    vec3 unshadowed = from_all_sides;
+// Light that a catcher receives where nothing shadows it, as radiance of a white surface. `from_all_sides` is the
+// irradiance / π of the environment or the constant ambient light.
+vec3 unshadowed_light(Surface s, vec3 from_all_sides) {
+    vec3 sum = from_all_sides;
 #ifdef NEEDS_PHONG  // empirical models reflect kd of the irradiance of lights, without 1/π
     const float scale = 1.0;
 #else
@@ -39,9 +39,15 @@ void catch_shadows(inout Surface s, vec3 shown, vec3 from_all_sides) {
     for (int i = 0; i < LIGHT_COUNT; ++i) {
         vec3 light_dir;
         vec3 irradiance = irradiance_from(lights[i], s.position, light_dir);
-        unshadowed += irradiance * (max(dot(s.normal, light_dir), 0.0) * scale);
+        sum += irradiance * (max(dot(s.normal, light_dir), 0.0) * scale);
     }
 #endif
+    return sum;
+}
+
+// Makes a catcher the surface that reflects `shown` of this unshadowed light. Shadows fade out together with the
+// projection, if there is one.
+void catch_shadows(inout Surface s, vec3 shown, vec3 unshadowed) {
     float fade = environment_projection.w > 0.0 ? catcher_fade(s.position) : 0.0;
     s.base_color = shown;
     s.diffuse = shown * (1.0 - fade) / max(unshadowed, 1e-6);

@@ -12,7 +12,14 @@ uniform float backdrop_blur;
 uniform vec3 background;
 #endif
 
-void begin_catcher(inout Surface s) {
+#ifdef HAS_ENVIRONMENT
+#define UNSHADOWED_LIGHT(s) unshadowed_light(s, light_from(s.normal, 2.0))
+#else
+#define UNSHADOWED_LIGHT(s) unshadowed_light(s, ambient)
+#endif
+
+// `unshadowed` is the light that it receives where nothing shadows it, as radiance of a white surface.
+void begin_catcher(inout Surface s, vec3 unshadowed) {
     vec3 shown = vec3(1.0);
 #ifdef SHOWS_ENVIRONMENT
     vec3 direction = caught_direction(s.position, -s.view_dir);
@@ -23,11 +30,7 @@ void begin_catcher(inout Surface s) {
 #endif
     shown = light_from(direction, lobe);
 #endif
-#ifdef HAS_ENVIRONMENT
-    catch_shadows(s, shown, light_from(s.normal, 2.0));
-#else
-    catch_shadows(s, shown, ambient);
-#endif
+    catch_shadows(s, shown, unshadowed);
 }
 
 // `coverage` is 1 in the step that begins the picture, and 0 in one that adds light to it.
@@ -46,6 +49,6 @@ void end_catcher(Surface s, float coverage) {
 #endif
 }
 #else
-#define begin_catcher(s)
+#define begin_catcher(s, unshadowed)
 #define end_catcher(s, coverage)
 #endif

@@ -6,10 +6,21 @@
 #define DIRECTION in
 #include "vertex_light_varyings.glsl"
 #include "light_outputs.glsl"
+#include "caught_light.glsl"
 
 void main() {
     Surface s = fragment_surface(PASS_VIEW);
     ReflectedLight direct = ReflectedLight(v_diffuse, v_specular);
+#ifdef HAS_ENVIRONMENT
+    ReflectedLight environment = ReflectedLight(v_environment_diffuse, v_environment_specular);
+#else
+    ReflectedLight environment = environment_lighting(s);
+#endif
+    vec3 unshadowed = direct.diffuse + environment.diffuse;
+#if SHADOW_LIGHT_COUNT > 0
+    for (int k = 0; k < SHADOW_LIGHT_COUNT; ++k) unshadowed += v_shadowed_diffuse[k];
+#endif
+    begin_catcher(s, unshadowed);
 #if SHADOW_LIGHT_COUNT > 0
     for (int k = 0; k < SHADOW_LIGHT_COUNT; ++k) {
         float light_visibility = shadow(shadow_lights[k], s.position, s.geometric_normal);
@@ -21,10 +32,9 @@ void main() {
     direct_irradiance = PI * direct.diffuse;
 #endif
     direct.diffuse *= s.diffuse;
-#ifdef HAS_ENVIRONMENT
-    ReflectedLight environment = ReflectedLight(v_environment_diffuse, v_environment_specular);
-#else
-    ReflectedLight environment = environment_lighting(s);
+#ifdef HAS_SHADOW_CATCHER
+    direct.specular = environment.specular = vec3(0.0);
 #endif
     write_light(s, direct, environment);
+    end_catcher(s, 1.0);
 }

@@ -7,7 +7,7 @@
 
 void main() {
     Surface s = fragment_surface(PASS_VIEW);
-    begin_catcher(s);
+    begin_catcher(s, UNSHADOWED_LIGHT(s));
     ReflectedLight direct = direct_lighting(s), environment = environment_lighting(s);
     write_light(s, direct, environment);
     end_catcher(s, 1.0);

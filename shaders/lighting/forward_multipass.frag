@@ -11,7 +11,7 @@ uniform int light;  // the scene's index
 
 void main() {
     Surface s = fragment_surface(PASS_VIEW);
-    begin_catcher(s);
+    begin_catcher(s, UNSHADOWED_LIGHT(s));
 #ifdef FIRST_PASS
     write_light(s, ReflectedLight(vec3(0.0), vec3(0.0)), environment_lighting(s));
     end_catcher(s, 1.0);

@@ -6,6 +6,9 @@
 #include <radiance.glsl>
 #include <sampled_directions.glsl>
 #include <traced_light.glsl>
+#if defined(SCENE_ANY_SHADOW_CATCHER) && defined(HAS_ENVIRONMENT)
+#include <shadow_catcher.glsl>
+#endif
 
 uniform ivec2 reduced_size;  // of the target
 uniform float max_roughness;
@@ -31,6 +34,12 @@ vec3 arriving_radiance(vec3 origin, vec3 direction, float angle, ivec2 pixel, in
     }
     if (s.lit == 0.0) return unlit_radiance(s);
     s.emissive = emitted_radiance(hit, s);
+#if defined(SCENE_ANY_SHADOW_CATCHER) && defined(HAS_ENVIRONMENT)
+    if (scene_has(hit.instance, SCENE_SHADOW_CATCHER)) {
+        vec3 shown = light_from(caught_direction(s.position, direction), -angle);
+        catch_shadows(s, shown, unshadowed_light(s, light_from(s.normal, 2.0)));
+    }
+#endif
     vec3 leaving = s.position + s.geometric_normal * ray_offset(s.position, hit.distance), light_dir;
     vec3 irradiance = irradiance_from_one_light(s, leaving, random_shift(pixel + 16384, seed).x, light_dir);
     ReflectedLight reflectance = shade(s, light_dir);
