@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from rendergraph.api import Frame, ViewMatrices, param, structural
 
 from ._cascades import bounding_sphere, cascade_view, farthest_visible, overlapping_spans, split_distances

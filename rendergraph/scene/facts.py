@@ -153,13 +153,15 @@ class FrameScene:
 
     @cached_property
     def catchers(self) -> npt.NDArray[np.int64]:
-        catching = [self.materials[placed.material].shadow_catcher for placed in self.objects]
-        return np.flatnonzero(catching & self.shown)
+        numbers = self.scene.catchers
+        return np.array([number for number in numbers if self.shown[number]], np.int64)
 
     @cached_property
     def bounds(self) -> tuple[Vec3, Vec3]:
-        counts = self.shown.copy()
-        counts[self.catchers] = False
+        counts = self.shown
+        if len(self.catchers):
+            counts = counts.copy()
+            counts[self.catchers] = False
         shown = self.corners if counts.all() else self.corners[counts]
         if not len(shown):
             return (-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)

@@ -427,12 +427,19 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
     ground: float | None = None
 
     @cached_property
+    def catchers(self) -> list[int]:
+        """Numbers of the objects that are shadow catchers."""
+        catching = {number for number, material in enumerate(self.materials) if material.shadow_catcher}
+        return [number for number, entry in enumerate(self.objects) if catching and entry.material in catching]
+
+    @cached_property
     def bounds(self) -> tuple[Vec3, Vec3]:
         """Least and greatest corner of the transformed boxes of everything drawn; a unit cube if nothing is.
 
         Shadow catchers do not count: a ground is as large as the surroundings.
         """
-        shown = [entry for entry in self.objects if not (entry.hidden or self.materials[entry.material].shadow_catcher)]
+        catchers = set(self.catchers)
+        shown = [entry for number, entry in enumerate(self.objects) if not entry.hidden and number not in catchers]
         if not shown:
             return (-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)
         transforms, (low, high) = np.array([entry.transform for entry in shown]), boxes_of(self.meshes, shown)

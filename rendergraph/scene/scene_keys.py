@@ -272,7 +272,13 @@ ENVIRONMENT = Table(
         Key("turbidity", number(1, 10), "With a sky: haze, from 1 for clean air.", 1.3),
         Key("overcast", number(0, 1), "With a sky: clouds, which hide the sun at 1.", 0.0),
         Key("ground", bool, "Puts a ground below the objects that shows the image and receives shadows.", False),
-        Key("ground_height", LENGTH, "With `ground`: where the image was taken; suits the objects by default.", None, "m"),
+        Key(
+            "ground_height",
+            LENGTH,
+            "With `ground`: where the image was taken; suits the objects by default.",
+            None,
+            "m",
+        ),
     ),
 )
 SKY_KEYS = ("sun", "elevation_degrees", "azimuth_degrees", "place", "time", "turbidity", "overcast")

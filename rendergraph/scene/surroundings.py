@@ -20,9 +20,9 @@ MOST_CHANGE = 8.0
 """Lights that illuminate by less or more than `KEY_LUX` by this factor are in other units, and are scaled."""
 GROUND = Material("ground", base_color=(0.3, 0.3, 0.3, 1.0), roughness=0.2, shadow_catcher=True)
 GROUND_EXTENT = 12.0
-"""From the middle to the sides of the ground, where nothing is to be seen of it, as a multiple of the objects' radius."""
+"""From the middle of the ground to its sides, where nothing is seen of it, as a multiple of the objects' radius."""
 GROUND_HEIGHT = 2.5
-"""Height from which the environment is projected on the ground, likewise."""
+"""Height from which the environment is projected on the ground, also in radii."""
 _BRIGHT = 90  # percentile of the illuminance of surfaces: what is well lit, without the vertices beside a lamp
 _MOST_POINTS = 4096
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -75,8 +75,8 @@ def lit(scene: Scene, camera: Camera, *, bare: bool = False) -> Scene:
 
     A sky brings its sun, if the scene has no directional light. A scene with neither lights nor an environment gets a
     key light and the `studio`. A mesh file cannot say what is around it, so the studio also fills the shadows of its
-    own lights, and those of a scene that wants a ground. Files in photometric units have lights that are thousands of times brighter: all of them are scaled by
-    one factor, with a warning.
+    own lights, and those of a scene that wants a ground. Files in photometric units have lights that are thousands of
+    times brighter: all of them are scaled by one factor, with a warning.
     """
     studio = shipped("studio")
     if not scene.lights and scene.environment is None:

@@ -61,7 +61,7 @@ def _inside(folder: Path) -> str | None:
 
 
 class PictureMetadata(Struct, frozen=True):
-    """How a picture was made: its pipeline; camera, environment and ground, if they were chosen beside it; its frame."""
+    """How a picture was made: its pipeline; camera, environment and ground, if chosen beside it; its frame."""
 
     document: Document
     camera: str | None

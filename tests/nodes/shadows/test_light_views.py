@@ -53,6 +53,7 @@ class Stage:
     def __post_init__(self) -> None:
         scene = FrameScene(Scene("stage", objects=self.objects, meshes=self.meshes))
         self.corners, self.shown, self.casting = scene.corners, scene.shown, scene.casting
+        self.catchers = scene.catchers
 
 
 def placed(mesh: int, scale: float, at: Any = (0, 0, 0), **more: Any) -> Object:

@@ -82,6 +82,7 @@ class Field:
         self.objects = [post(x, z) for x in range(-99, 100, 11) for z in range(-149, 150, 11)]
         scene = FrameScene(Scene("field", objects=tuple(self.objects), meshes=self.meshes))  # type: ignore[arg-type]
         self.corners, self.shown, self.casting = scene.corners, scene.shown, scene.casting
+        self.catchers = scene.catchers
 
 
 @dataclass(frozen=True)
