@@ -341,7 +341,7 @@ class _Reader:
             lone = [key for key in values if key not in ("ground", "ground_height")]
             if lone or not values.get("ground"):
                 key = entry.get(lone[0]) if lone else None
-                self.validator.report(key or entry, "RG321", "'environment' needs a 'file', or `ground: true`")
+                self.validator.report(key or entry, "RG321", "environment needs 'file', or `ground: true` alone")
             return None
         self.recipe["environment", ""] = values
         place, file = _value(entry, "file"), values["file"]
