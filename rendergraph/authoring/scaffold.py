@@ -74,10 +74,10 @@ def new_project(where: Path) -> NewNode:
     own = {file.name.removesuffix(".in"): _fill(file, words) for file in _templates("project")}
     more = {".gitignore": own.pop("gitignore"), "scene.schema.json": _json(as_markdown(file_schema(SCENE)))}
     files = node | own
-    _refuse_existing(where, files)
+    refuse_existing(where, files)
     more[SCHEMA_FILE] = _schema(files, by_path=False)
     files |= {path: text for path, text in more.items() if not (where / path).exists()}
-    _write(where, files)
+    write_files(where, files)
     commands = ["rendergraph run pipeline.yaml", "rendergraph new-node glow", "rendergraph run glow.yaml"]
     if where.resolve() != Path.cwd():
         commands.insert(0, f"cd {shlex.quote(str(where))}")
@@ -95,14 +95,14 @@ def new_node(name: str, kind: Kind = "fullscreen", *, package: bool = False, whe
         raise InputError(Problem("RG530", f"a node cannot be called '{name}': {mistake}"))
     nodes, is_found = ("", False) if package else _project_nodes(where)
     files = _files(name, kind, package=package, nodes=nodes)
-    _refuse_existing(where, [name] if package else files)
+    refuse_existing(where, [name] if package else files)
     pipeline = next(file for file in files if file.endswith(".yaml"))
     schema_file = (Path(pipeline).parent / SCHEMA_FILE).as_posix()
     has_schema = (where / schema_file).exists()
     by_path = kind == "shader-only" and not package and not nodes
     if not has_schema:
         files[schema_file] = _schema(files, by_path=by_path)
-    _write(where, files)
+    write_files(where, files)
     plugin = "--plugin ." if package else "" if by_path or is_found else f"--plugin {name}.py"
     inside = [path.removeprefix(f"{name}/") if package else path for path in files]
     source = next(p for p in inside if Path(p).name == (f"{name}.frag" if kind == "shader-only" else f"{name}.py"))
@@ -239,14 +239,15 @@ def _json(document: Any) -> str:
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 
-def _refuse_existing(where: Path, paths: Iterable[str]) -> None:
+def refuse_existing(where: Path, paths: Iterable[str]) -> None:
+    """Raise an InputError if one of the files that are to be written exists."""
     existing = [path for path in paths if (where / path).exists() or (where / path).is_symlink()]
     text = "'{}' already exists and was not changed; move it or choose another name"
     if existing:
         raise InputError([Problem("RG531", text.format(path), Place(path)) for path in existing])
 
 
-def _write(where: Path, files: Mapping[str, str]) -> None:
+def write_files(where: Path, files: Mapping[str, str | bytes]) -> None:
     """Write all files or none; a file that appears meanwhile under one of the names is not touched."""
     made: list[Path] = []
     try:
@@ -256,15 +257,15 @@ def _write(where: Path, files: Mapping[str, str]) -> None:
                 if not parent.is_dir():
                     parent.mkdir()
                     made.append(parent)
-            with target.open("x", encoding="utf-8") as file:
+            with target.open("xb") as file:
                 made.append(target)
-                file.write(text)
+                file.write(text.encode() if isinstance(text, str) else text)
     except BaseException as error:
         for target in reversed(made):
             with contextlib.suppress(OSError):
                 target.rmdir() if target.is_dir() else target.unlink()
         if isinstance(error, FileExistsError):
-            _refuse_existing(where, [path for path in files if where / path not in made])
+            refuse_existing(where, [path for path in files if where / path not in made])
         if isinstance(error, OSError):
             shown = Path(str(error.filename)) if error.filename else where
             raise RenderError(Problem("RG509", f"{shown}: {error.strerror or error}")) from error

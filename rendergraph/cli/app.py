@@ -30,7 +30,7 @@ from rendergraph.errors import (
 from rendergraph.version import __version__
 
 _MODULES = {
-    "authoring": ("init", "new-node", "check-node"),
+    "authoring": ("init", "copy", "new-node", "check-node"),
     "edit": ("edit", "upgrade"),
     "inspection": ("check", "plan", "graph", "config", "diff", "schema"),
     "lists": ("nodes", "pipelines", "scenes", "environments"),
@@ -54,6 +54,7 @@ VERBS = (
     "explain",
     "schema",
     "init",
+    "copy",
     "new-node",
     "check-node",
     "doctor",

@@ -1,4 +1,4 @@
-"""Verbs for authors of nodes: `init`, `new-node`, `check-node`."""
+"""Verbs for authors: `init`, `copy`, `new-node`, `check-node`."""
 
 from __future__ import annotations
 
@@ -35,6 +35,27 @@ def init(folder: Path, as_json: bool) -> None:
     from rendergraph.authoring import new_project
 
     print_files(new_project(folder), {"folder": str(folder)}, as_json)
+
+
+@click.command("copy", no_args_is_help=True)
+@click.argument("name", shell_complete=options.offered("topics"))
+@options.json_option
+def copy(name: str, as_json: bool) -> None:
+    """Copy a shipped pipeline, scene or node to edit.
+
+    It goes into the current folder. Pipelines and scenes keep their names, and are then used by path: `./NAME.yaml`. A node becomes the type `my_NAME`,
+    with its shaders. `pipeline:NAME`, `scene:NAME` or `node:NAME` says which, where a name is ambiguous. No file is
+    ever overwritten.
+
+    \b
+    Examples:
+      rendergraph copy bloom
+      rendergraph copy cornell_box
+      rendergraph copy node:bloom
+    """
+    from rendergraph.authoring import copy_shipped
+
+    print_files(copy_shipped(name), {"copied": name}, as_json)
 
 
 @click.command("new-node", no_args_is_help=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -12,15 +13,17 @@ from rendergraph.compare.batches import MOST_RUNS
 from rendergraph.compare.prepare import (
     SweepKeywords,
     SweepOptions,
+    by_view,
     measured_at,
     named_reference,
     prepare,
     prepare_variants,
     read_picture,
+    seen,
 )
 from rendergraph.compare.results import Comparison, Reference, Result, Search, measure_against, pareto
 from rendergraph.compare.runner import Runner, SweepRunner
-from rendergraph.compare.space import Axes, Space, typed, unique_names
+from rendergraph.compare.space import Axes, Space, run_name, typed, unique_names
 from rendergraph.compare.store import RUN, Failure, SweepFolder, locked
 from rendergraph.diff import diff
 from rendergraph.errors import InputError, Problem, UsageError
@@ -163,9 +166,12 @@ def sweep(
         DeviceError: there is no usable GL device.
     """
     options = options.replace(**settings)
-    base, out, reference = as_pipeline(base), Path(out), named_reference(reference)
+    base, out, reference, space = as_pipeline(base), Path(out), named_reference(reference), Space.of(axes)
+    space.check()
+    if len(views := by_view(space, reference, options.only)) > 1:
+        return _sweep_of_views(base, views, out, reference, options, space)
     with track_reads() as files:
-        prepared = prepare(base, axes, out, reference, options)
+        prepared = prepare(base, space, out, reference, options)
     runs = prepared.runs
     with locked(out):
         folder = SweepFolder.open(out, prepared.study, resume=options.resume)
@@ -197,6 +203,43 @@ def sweep(
         redrawn=redrawn,
         torn=folder.incomplete,
         failures=failures,
+    )
+
+
+def _sweep_of_views(
+    base: Pipeline,
+    views: Sequence[tuple[Mapping[str, str], Space, Sequence[int] | None]],
+    out: Path,
+    reference: Path | Pipeline | None,
+    options: SweepOptions,
+    space: Space,
+) -> Sweep:
+    """Sweep the runs of each scene, camera and environment on their own: pictures of two scenes are not compared."""
+    parts: list[Sweep] = []
+    with report_progress(options.progress, "runs") as report:
+        for view, part, only in views:
+            done = sum(len(each.comparison.results) for each in parts)
+            count = partial(lambda done, number, _: report(done + number, space.count()), done)
+            own = options.replace(resume=options.resume or bool(parts), only=only, progress=count)
+            parts.append(sweep(base, part, out, seen(reference, view), own))
+    first, names = parts[0].comparison, [run_name(run) for run in space.runs()]
+    results = sorted(
+        (r for part in parts for r in part.comparison.results), key=lambda result: names.index(result.name)
+    )
+    comparison = replace(
+        first,
+        results=tuple(results),
+        scene=", ".join(dict.fromkeys(part.comparison.scene for part in parts)),
+        reference=first.reference if reference else replace(first.reference, name="the first of each scene"),
+        notes=tuple(dict.fromkeys(note for part in parts for note in part.comparison.notes)),
+        warnings=tuple(dict.fromkeys(problem for part in parts for problem in part.comparison.warnings)),
+    )
+    counts = ("executed", "alone", "resumed", "timed", "redrawn", "torn")
+    return Sweep(
+        comparison,
+        space,
+        failures=tuple(failure for part in parts for failure in part.failures),
+        **{name: sum(getattr(part, name) for part in parts) for name in counts},
     )
 
 

@@ -26,7 +26,7 @@ from rendergraph.pipelines.references import renderer_or_other
 from rendergraph.session import stages
 from rendergraph.session.picture_metadata import frame_metadata, is_picture, pipeline_metadata
 from rendergraph.session.pipeline import Pipeline
-from rendergraph.session.selection import Selection
+from rendergraph.session.selection import VIEW, Selection
 from rendergraph.textures import FORMATS
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from rendergraph.farm import Executor, Worker
     from rendergraph.farm.executors import ExecutorChoice
     from rendergraph.link import Endpoint, Graph
+    from rendergraph.resolve import PipelineSpec
     from rendergraph.session.gpu import Gpu
     from rendergraph.session.progress import Progress
     from rendergraph.session.selection import Selection
@@ -279,10 +280,19 @@ def prepare(
     """Plan the runs of a sweep, with the arguments of `sweep`."""
     space = Space.of(axes)
     space.check()
+    if len(views := by_view(space, reference, options.only)) > 1:
+        parts = [
+            prepare(base, part, out, seen(reference, view), options.replace(only=only)) for view, part, only in views
+        ]
+        by_name = {run.name: run for part in parts for run in part.runs}
+        names = [run_name(run) for run in space.runs()]
+        ordered = [by_name[name] for name in names if name in by_name]
+        runs = tuple(replace(run, number=number) for number, run in enumerate(ordered))
+        return replace(parts[0], runs=runs, space=space)
     combinations = space.runs()
     names = unique_names([run_name(run) for run in combinations])
     base = measured_at(base, options.metric)
-    reference_name = names[0]
+    reference_name = run_name({path: value for path, value in combinations[0].items() if path not in VIEW})
     if isinstance(reference, Pipeline):
         reference, reference_name = measured_at(reference, options.metric), reference.resolve().spec.name
     elif reference is not None:
@@ -303,6 +313,36 @@ def prepare(
         for run, setting in zip(prepared.runs, combinations, strict=True)
     )
     return replace(prepared, runs=runs, space=space, study=_study(base, options.frame, reference_name))
+
+
+def by_view(
+    space: Space, reference: Path | Pipeline | None, only: Sequence[int] | None = None
+) -> list[tuple[dict[str, str], Space, tuple[int, ...] | None]]:
+    """Return the runs of each scene, camera and environment that axes choose, which are compared with each other alone.
+
+    Against a pipeline, so are those of each value in a scene: the reference is rendered with it, too. Each comes with
+    its settings, its space, and which of its runs to render, as `SweepOptions.only` has it.
+    """
+    paths = [axis.path for axis in space.axes]
+    paths = [p for p in paths if p in VIEW or (isinstance(reference, Pipeline) and p.startswith("scene."))]
+    groups: dict[tuple[tuple[str, str], ...], list[int]] = {}
+    runs = space.runs()
+    for number, run in enumerate(runs):
+        groups.setdefault(tuple((path, run[path]) for path in paths), []).append(number)
+    found = []
+    for view, numbers in groups.items():
+        chosen = None if only is None else tuple(place for place, number in enumerate(numbers) if number in only)
+        if chosen != ():
+            found.append((dict(view), replace(space, chosen=tuple(runs[number] for number in numbers)), chosen))
+    return found
+
+
+def seen(reference: Path | Pipeline | None, view: Mapping[str, str]) -> Path | Pipeline | None:
+    """Return a reference with the scene, the camera and the environment of the runs that it is measured against."""
+    if isinstance(reference, Path):
+        text = f"a picture cannot be the reference of several scenes; name a pipeline instead of '{reference}'"
+        raise UsageError(Problem("RG500", text))
+    return reference if reference is None else reference.set(view)
 
 
 def prepare_variants(
@@ -420,7 +460,7 @@ def _study(base: Pipeline, frame: int, reference: str) -> dict[str, Any]:
     width, height = spec.size
     return {
         "pipeline": spec.name,
-        "scene": str(spec.scene.stem) if spec.scene else None,
+        "scene": spec.scene_name or None,
         "environment": str(selection.environment) if selection.environment else None,
         "camera": selection.camera,
         "size": f"{width}x{height}",
@@ -483,11 +523,15 @@ def match_scene_and_size(pipelines: Sequence[Pipeline]) -> tuple[list[Pipeline],
     """Return the pipelines with the first one's scene and size, and the changes in words."""
     specs = [pipeline.resolve().spec for pipeline in pipelines]
     first, notes = specs[0], []
-    if first.scene is not None and any(spec.scene != first.scene for spec in specs):
-        others = [spec.name for spec in specs if spec.scene != first.scene]
-        notes += [f"'{name}' is rendered with the scene of '{first.name}': {first.scene.stem}" for name in others]
+    if (first.scene or first.scene_changes) and (strange := [spec for spec in specs if not _has_scene_of(spec, first)]):
+        notes += [f"'{spec.name}' is rendered with the scene of '{first.name}': {first.scene_name}" for spec in strange]
+        base = {"extends": str(first.scene)} if first.scene else {"scene": 1}
+        changed = {**base, **first.scene_changes.plain()} if first.scene_changes is not None else None
         # All of them, the first one too: one scene under one name is read once and stays on the GPU.
-        pipelines = [pipeline.with_scene(first.scene) for pipeline in pipelines]
+        pipelines = [
+            pipeline.with_scene(changed or first.scene or "") if spec in strange or changed is None else pipeline
+            for pipeline, spec in zip(pipelines, specs, strict=True)
+        ]
     width, height = first.size
     others = [spec.name for spec in specs if spec.size != first.size]
     notes += [f"'{name}' is rendered at the size of '{first.name}': {width}×{height}" for name in others]
@@ -495,6 +539,13 @@ def match_scene_and_size(pipelines: Sequence[Pipeline]) -> tuple[list[Pipeline],
         pipeline.with_size(first.size) if spec.size != first.size else pipeline
         for pipeline, spec in zip(pipelines, specs, strict=True)
     ], notes
+
+
+def _has_scene_of(spec: PipelineSpec, first: PipelineSpec) -> bool:
+    """Whether two pipelines have the same scene but for what each changes in it."""
+    if spec.scene is not None or first.scene is not None:
+        return spec.scene == first.scene
+    return bool(spec.scene_changes and first.scene_changes) and spec.scene_name == first.scene_name
 
 
 def compared_output(graphs: Sequence[Graph], encoding: Encoding | None, *, measured: bool) -> tuple[str, Encoding]:

@@ -128,7 +128,7 @@ class Runner:
             results=results,
             reference=self.reference,
             base=(base.name, base.planned.linked.graph),
-            scene=linked.spec.scene.stem if linked.spec.scene else linked.scene.name,
+            scene=linked.spec.scene_name or linked.scene.name,
             camera=linked.selection.camera,
             size=linked.graph.size,
             frame=self.options.frame,

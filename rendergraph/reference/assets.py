@@ -41,7 +41,7 @@ def describe_pipeline(name: str, linked: Linked) -> dict[str, Any]:
         "line": opening(path) or spec.description,
         "file": str(path),
         "text": path.read_text(encoding="utf-8"),
-        "scene": spec.scene.stem if spec.scene else None,
+        "scene": spec.scene_name or None,
         "size": list(graph.size),
         "nodes": [
             {"id": node.id, "type": node.type.name, "line": "" if node.type.missing else summary(node.type)}

@@ -168,6 +168,13 @@ class PipelineSpec(Struct, frozen=True, eq=False):
     missing: tuple[str, ...] = ()
     unrun: Mapping[str, str] = {}
 
+    @property
+    def scene_name(self) -> str:
+        """The stem of the scene's file, which changes may have; empty without a scene."""
+        if self.scene is None:
+            return "" if self.scene_changes is None else "scene"
+        return self.scene.stem
+
     def check(self) -> None:
         """Raise the problems found so far; for callers that do not go on to `link`."""
         if self.problems:

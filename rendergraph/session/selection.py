@@ -26,6 +26,10 @@ MOST_FRAMES = 100_000
 MOST_SUBFRAMES = 4096
 
 
+VIEW = ("scene", "camera", "environment")
+"""What `-s` and axes set without a node: `-s scene=spheres` is `--scene spheres`."""
+
+
 class Selection(Struct, frozen=True):
     """A pipeline's name with everything that changes it, as the options of every verb have it.
 
@@ -62,6 +66,11 @@ class Selection(Struct, frozen=True):
             force_setattr(self, "size", _pair(self.size))
         if self.shutter is not None and not 0 <= self.shutter <= 1:
             raise UsageError(Problem("RG500", f"shutter: expected a share of a frame, 0 to 1, got {self.shutter}"))
+        for text in self.sets:
+            path, _, value = text.partition("=")
+            if path.strip() in VIEW and value:
+                force_setattr(self, path.strip(), Path(value) if path.strip() == "environment" else value)
+                force_setattr(self, "sets", tuple(each for each in self.sets if each is not text))
         if not self.limits:
             return
         known = {name for names in _limit_names().values() for name in names}

@@ -23,7 +23,7 @@ from rendergraph.compare.results import pareto
 from rendergraph.compare.runner import list_sweep
 from rendergraph.compare.space import Axis, Space, parse_axis, pipelines, typed
 from rendergraph.compare.store import RESULTS, ResultsLog, checksum, kept_runs, line_schema
-from rendergraph.errors import InputError
+from rendergraph.errors import InputError, UsageError
 from rendergraph.images import read, write
 
 AXES = tuple(parse_axis(x) for x in ("shadows.taps=1,3", "light.shading=pbr,phong", "display.curve=aces,none,neutral"))
@@ -452,3 +452,21 @@ def test_the_front_is_what_nothing_beats() -> None:
     assert pareto([slow, quick, worse, broken]) == [quick, slow]
     hidden = fake(0.5, 0.0, not_finite=3)  # 8 bits show nothing of it
     assert pareto([slow, quick, hidden]) == [quick, slow]
+
+
+def test_each_scene_of_a_sweep_is_measured_against_its_own_reference(tmp_path: Path) -> None:
+    axes = {"scene": ["cornell_box", "shadow_study"], "light.shading": ["phong", "pbr"]}
+    base = rg.load("forward", size=(32, 18))
+    first = sweep(base, axes, tmp_path / "first", frames=1)
+    flips = [result.metrics.flip for result in first.comparison.results]
+    assert [flip == 0 for flip in flips] == [True, False, True, False]
+    assert "RG" not in str(first.comparison.warnings)
+    again = sweep(base, axes, tmp_path / "first", frames=1, resume=True)
+    assert (again.resumed, again.executed) == (4, 0)
+    against = sweep(base, axes, tmp_path / "against", "shading-pbr", frames=1)
+    assert [result.metrics.flip == 0 for result in against.comparison.results] == [False, True, False, True]
+    lights = {"scene.lights.lamp.intensity": [10, 80], "light.shading": ["phong", "pbr"]}
+    lit = sweep(base.with_scene("cornell_box"), lights, tmp_path / "lit", "shading-pbr", frames=1)
+    assert [result.metrics.flip == 0 for result in lit.comparison.results] == [False, True, False, True]
+    with pytest.raises(UsageError, match="a picture cannot be the reference of several scenes"):
+        sweep(base, axes, tmp_path / "none", Path("a.png"), frames=1)

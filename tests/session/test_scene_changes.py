@@ -116,3 +116,14 @@ def test_a_mesh_file_takes_changes_and_keeps_its_surroundings(tmp_path: Path) ->
     assert [light.name for light in scene_of(lit).lights] == ["lamp"]
     assert scene_of(lit).environment is not None
     assert scene_of(plain).environment is not None
+
+
+def test_scene_camera_and_environment_are_settings_too(base: Path) -> None:
+    pipeline = rg.load("forward").set({"scene": str(base), "camera": "main", "environment": "studio"})
+    assert pipeline.selection == rg.load("forward", scene=base, camera="main", environment="studio").selection
+    with pytest.raises(InputError, match=r"^--camera side: RG322 the scene has no camera 'side'"):
+        pipeline.set("camera", "side").link()
+    with pytest.raises(
+        InputError, match=r"^--scene spere: RG015 there is no shipped scene 'spere'; did you mean 'spheres'"
+    ):
+        pipeline.set("scene", "spere").link()
