@@ -43,9 +43,9 @@ def init(folder: Path, as_json: bool) -> None:
 def copy(name: str, as_json: bool) -> None:
     """Copy a shipped pipeline, scene or node to edit.
 
-    It goes into the current folder. Pipelines and scenes keep their names, and are then used by path: `./NAME.yaml`. A node becomes the type `my_NAME`,
-    with its shaders. `pipeline:NAME`, `scene:NAME` or `node:NAME` says which, where a name is ambiguous. No file is
-    ever overwritten.
+    It goes into the current folder. Pipelines and scenes keep their names, and are then used by path: `./NAME.yaml`. A
+    node becomes the type `my_NAME`, with its shaders. `pipeline:NAME`, `scene:NAME` or `node:NAME` says which, where a
+    name is ambiguous. No file is ever overwritten.
 
     \b
     Examples:
