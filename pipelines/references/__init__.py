@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,19 +20,21 @@ def _installation(name: str) -> Any:
     return import_module(f"{__name__}.{name}.installation")
 
 
-def renderer_or_other(selection: Selection) -> Selection:
-    """Return the selection of a renderer's pipeline for its name, which no file has; others as they are.
+def reference_selection(selection: Selection) -> Selection:
+    """Return the selection of a reference, whose name may be followed by settings of its own, as of `-s`.
 
-    Parameters of its node `light` may follow: `mitsuba:max_bounces=2,diffuse_lobe=fresnel`.
+    They follow a colon, with commas between them: `path-traced:light.max_bounces=2,light.seed=1`. Those of a renderer,
+    whose name no file has, may omit its node `light`: `mitsuba:max_bounces=2`. Other settings and patches do not apply.
 
     Raises:
         UsageError: the renderer, or what it needs, is not installed.
     """
-    name, colon, values = selection.label.partition(":")
+    name, _, settings = selection.label.partition(":")
+    sets = tuple(re.split(r",(?![^\[]*\])", settings)) if "=" in settings else ()
     if name not in NAMES:
-        return selection
+        return replace(selection, source=name if sets else selection.source, sets=sets, patches=())
     _installation(name).require()
-    sets = tuple(f"light.{value}" for value in values.split(",")) if colon else ()
+    sets = tuple(text if "." in text.partition("=")[0] else f"light.{text}" for text in sets)
     folder = Path(__file__).parent / name / "plugin"
     plugins = (*selection.plugins, folder)
     return replace(selection, source=str(folder / f"{name}.yaml"), sets=sets, patches=(), plugins=plugins)

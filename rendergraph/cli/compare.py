@@ -249,28 +249,34 @@ def _load(name: str, names: Sequence[str], select: options.Select) -> Pipeline:
 
 def _with(settings: Sequence[str], selection: Selection) -> Pipeline:
     """Return the pipeline with the settings of one variant; mistakes in them are located at `--with`."""
+    return _set_by("--with", settings, replace(selection, sets=(*selection.sets, *settings)))
+
+
+def _set_by(option: str, settings: Sequence[str], selection: Selection) -> Pipeline:
+    """Return a pipeline some of whose settings come from an option, where mistakes in them are located."""
+
+    def located(problem: Problem) -> Problem:
+        setting = problem.place.option("--set") if problem.place else None
+        typed = setting is not None and setting.text in settings
+        return problem.relocate(Place(Option(option, f"'{setting.text}'"))) if setting and typed else problem
+
     try:
-        return options.linked(replace(selection, sets=(*selection.sets, *settings)))
+        return options.linked(selection)
     except InputError as error:
-        raise error.relocated(lambda problem: _of_with(problem, settings)) from None
-
-
-def _of_with(problem: Problem, settings: Sequence[str]) -> Problem:
-    setting = problem.place.option("--set") if problem.place else None
-    typed = setting is not None and setting.text in settings
-    return problem.relocate(Place(Option("--with", f"'{setting.text}'"))) if setting and typed else problem
+        raise error.relocated(located) from None
 
 
 def load_reference(reference: str | None, select: options.Select) -> Path | Pipeline | None:
     """Return the reference: a picture's path, or a pipeline with the same scene, without the variants' settings."""
-    from rendergraph.pipelines.references import renderer_or_other
+    from rendergraph.pipelines.references import reference_selection
     from rendergraph.session.picture_metadata import is_picture
 
     if reference is None:
         return None
     if is_picture(reference):
         return Path(reference)
-    return options.linked(renderer_or_other(replace(select(reference), sets=(), patches=())))
+    selection = reference_selection(select(reference))
+    return _set_by("--reference", selection.sets, selection)
 
 
 def check_page(output: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -22,7 +23,7 @@ from rendergraph.compare.space import Axes, Space, pipelines, run_name, unique_n
 from rendergraph.errors import InputError, Option, Place, Problem, UsageError
 from rendergraph.farm.bundle import relocate_selection
 from rendergraph.metrics import Encoding, check_sizes
-from rendergraph.pipelines.references import renderer_or_other
+from rendergraph.pipelines.references import reference_selection
 from rendergraph.session import stages
 from rendergraph.session.picture_metadata import frame_metadata, is_picture, pipeline_metadata
 from rendergraph.session.pipeline import Pipeline
@@ -361,15 +362,15 @@ def prepare_variants(
     is_truth = options.metric is None and any(
         {"radiance", "variance"} <= o.resolve().spec.outputs.keys() for o in others
     )
-    if is_truth:
-        others = [_seen_as(variants[0], other) for other in others]
     matched, notes = match_scene_and_size([*variants, *others])
+    names = unique_names(names or [pipeline.link().graph.name for pipeline in matched[: len(variants)]])
+    if is_truth:
+        matched[-1] = _seen_as(matched[:-1], names, matched[-1], notes)
     planned = [pipeline.check() for pipeline in matched]
     if not is_truth and options.limits != SweepOptions().limits:
         text = "--reference-noise, --reference-samples and --reference-seconds belong to a reference that accumulates"
         raise UsageError(Problem("RG500", f"{text}: a pipeline with the outputs `radiance` and `variance`"))
     graphs = [each.linked.graph for each in planned]
-    names = unique_names(names or [graph.name for graph in graphs[: len(variants)]])
     picture = read_picture(reference, graphs[0].size, names[0]) if isinstance(reference, Path) else None
     compared = graphs[: len(variants)] if is_truth else graphs
     output, encoding = compared_output(compared, picture[1] if picture else None, measured=options.metric is not None)
@@ -400,10 +401,44 @@ def prepare_variants(
     )
 
 
-def _seen_as(first: Pipeline, truth: Pipeline) -> Pipeline:
-    """Return a truth with the camera and the environment of what is compared, unless it has others."""
-    own, other = truth.selection, first.selection
-    return truth.select(camera=own.camera or other.camera, environment=own.environment or other.environment)
+def _seen_as(variants: Sequence[Pipeline], names: Sequence[str], truth: Pipeline, notes: list[str]) -> Pipeline:
+    """Return a truth with the camera, the environment and the materials of what is compared, unless it has its own.
+
+    A node of the truth that stands in the place of another type of node takes that one's parameters, such as `shading`.
+    """
+    own, other = truth.selection, variants[0].selection
+    truth = truth.select(camera=own.camera or other.camera, environment=own.environment or other.environment)
+    first, *others = (_told(variant, truth) for variant in variants)
+    if first:
+        settings = ", ".join(f"{path}={value}" for path, value in first.items())
+        notes.append(f"'{truth.link().graph.name}' is drawn with {settings}, as '{names[0]}' has it")
+    if differing := [name for name, told in zip(names[1:], others, strict=True) if told != first]:
+        paths = ", ".join(dict.fromkeys(path for told in (first, *others) for path in told))
+        notes.append(f"measured against the truth of '{names[0]}', with another {paths}: {', '.join(differing)}")
+    for path, value in first.items():
+        truth = truth.set(path, value)
+    return truth
+
+
+def _told(variant: Pipeline, truth: Pipeline) -> dict[str, Any]:
+    """Return what nodes of a pipeline have that the truth's nodes of other types in their places can take over.
+
+    Those are parameters of the same name, unit and default whose values differ, and that the truth itself does not set.
+    """
+    graph, written, found = truth.link().graph, truth.resolve().spec.nodes, {}
+    for node in variant.link().graph.nodes:
+        twin = graph.members.get(node.id)
+        if twin is None or twin.type.name == node.type.name:
+            continue
+        taken = twin.type.cls.parameters()
+        for name, parameter in node.type.cls.parameters().items():
+            value = getattr(node.node, name)
+            if name not in taken or name in written[node.id].params or value == getattr(twin.node, name):
+                continue
+            if (taken[name].unit, taken[name].default) == (parameter.unit, parameter.default):
+                with contextlib.suppress(TypeError, ValueError):  # a value that the truth does not know
+                    found[f"{node.id}.{name}"] = taken[name].convert(value)
+    return found
 
 
 def _twins(run: Run, pipeline: Pipeline, notes: list[str]) -> Iterator[Twin]:
@@ -477,7 +512,7 @@ def named_reference(reference: Path | Pipeline | str | None) -> Path | Pipeline 
     """Return a reference; a name becomes a picture's path or a pipeline."""
     if not isinstance(reference, str):
         return reference
-    return Path(reference) if is_picture(reference) else Pipeline(renderer_or_other(Selection(reference)))
+    return Path(reference) if is_picture(reference) else Pipeline(reference_selection(Selection(reference)))
 
 
 def read_picture(path: Path, size: tuple[int, int] | None = None, name: str = "") -> tuple[Pixels, Encoding]:

@@ -126,7 +126,9 @@ def read_sweep(path: Path) -> SweepFile:
         raise InputError(validator.problems)
     values = plain(root, SWEEP)
     groups = {",".join(group.plain()): group for group in _items(root.get("zip"))}
-    files = [key for key in ("pipeline", "reference", "scene") if key in values and not is_name(values[key])]
+    files = [
+        key for key in ("pipeline", "reference", "scene") if key in values and not is_name(values[key].split(":")[0])
+    ]
     values |= {key: str(path.parent / values[key]) for key in files}
     given, minimise = root.get("set"), values.get("minimise", ())
     options = {name: values[key] for key, name in _OPTIONS.items() if key in values}

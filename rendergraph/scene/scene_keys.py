@@ -222,7 +222,7 @@ LIGHT = Table(
         Key("range", LENGTH, "Where its light is faded out (point, spot); none by default.", None, "m"),
         Key("inner_degrees", number(0, 90), "Half angle of the spot's full brightness.", 0.0, "°"),
         Key("outer_degrees", number(0, 90, above=True), "Half angle where the spot ends.", 45.0, "°"),
-        Key("casts_shadow", bool, "Whether `shadow_map.light: auto` may choose it.", True),
+        Key("casts_shadow", bool, "Whether `shadow_map.light: auto` may choose it; rays find its shadows.", True),
         Key(
             "repeat",
             _repeat(

@@ -385,6 +385,7 @@ def test_settings_make_variants_of_one_pipeline(cli: Any) -> None:
             3,
             "--with 'shadows.tps=1': RG103 node 'shadows' (shadow_pcf) has no param or input",
         ),
+        (["--reference", "path-traced:light.sed=1"], 3, "--reference 'light.sed=1': RG103 node 'light' (path_traced)"),
         (["deferred", "--with", "shadows.taps=1"], 2, "RG500 --with makes variants of one pipeline"),
         (["--with", "taps"], 2, "'taps' is not PATH=VALUE"),
         (["deferred", "--metric", "ao.occlusion"], 3, "--metric ao.occlusion: RG109 in forward: there is no node 'ao'"),

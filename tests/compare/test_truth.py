@@ -27,6 +27,7 @@ from rendergraph.api import (
     Radiance,
     Steps,
     Visibility,
+    define,
     param,
 )
 from rendergraph.catalog import Catalog
@@ -37,6 +38,8 @@ from rendergraph.compare.results import TwinError
 from rendergraph.compare.sweepfile import read_sweep
 from rendergraph.errors import InputError, UsageError
 from rendergraph.metrics import measure, relative_mse, relative_noise, signed_difference
+from rendergraph.pipelines.references import reference_selection
+from rendergraph.session.selection import Selection
 
 SIZE = (24, 12)
 SPREAD = 0.125
@@ -76,6 +79,9 @@ class Light(Node):
     visibility = Input(Visibility, doc="Of the light.")
     occlusion = Input(Occlusion, optional=True, doc="Of the ambient light.")
     radiance = Output(Radiance, format="rgba32f", doc="Both.")
+    tint: float = param(default=1.0, doc="Factor of the light, which the truth has, too.")
+    shade: int = define(default=1, max=2, doc="The truth's has another limit.")
+    samples: int = define(default=1, doc="The truth's has another unit.")
 
 
 class Glow(Node):
@@ -111,6 +117,9 @@ class Sampled(Node):
     radiance = Output(Radiance, format="rgba32f", doc="Mean of all frames so far.")
     variance = Output(Radiance, format="rgba32f", doc="Of this mean.")
     samples_taken = Output(Luminance, format="r32f", doc="16 in each frame.")
+    tint: float = param(default=1.0, doc="Factor of the light.")
+    shade: int = define(default=1, max=1, doc="No more than 1.")
+    samples: int = define(default=1, unit="paths", doc="Not those of a raster.")
     mean = History(Radiance, format="rgba32f")
 
     def record(self, steps: Steps) -> None:
@@ -145,20 +154,24 @@ SHADERS = {
     "crevice.frag": "out float occlusion; void main() { occlusion = 1.0; }",
     "exact_crevice.frag": "#include <frame.glsl>\n" + _HEAD + _NOISE + "out float occlusion;\n"
     "void main() { occlusion = 0.9 + 0.1 * v_uv.y + 0.8 * sign_of(gl_FragCoord.xy, float(frame_index)); }",
-    "light.frag": "uniform sampler2D visibility;\n#ifdef HAS_OCCLUSION\nuniform sampler2D occlusion;\n#endif\n"
+    "light.frag": "uniform sampler2D visibility; uniform float tint;\n#ifdef HAS_OCCLUSION\nuniform sampler2D occlusion;\n#endif\n"
     "out vec4 radiance; void main() { ivec2 at = ivec2(gl_FragCoord.xy); float open = 1.0;\n"
     "#ifdef HAS_OCCLUSION\nopen = texelFetch(occlusion, at, 0).x;\n#endif\n"
-    "radiance = vec4(vec3(1.5, 1.0, 0.25) * texelFetch(visibility, at, 0).x + 0.2 * open, 1.0); }",
+    "radiance = vec4(tint * (vec3(1.5, 1.0, 0.25) * texelFetch(visibility, at, 0).x + 0.2 * open), 1.0); }",
     "glow.frag": "out vec4 radiance; void main() { radiance = vec4(0.5); }",
     "gain.frag": "uniform sampler2D radiance; out float gain;\n"
     "void main() { gain = 0.5 / texelFetch(radiance, textureSize(radiance, 0) - 1, 0).y; }",
     "show.frag": "uniform sampler2D radiance;\n#ifdef HAS_GAIN\nuniform sampler2D gain;\n#endif\nout vec4 color;\n"
     "void main() { float factor = 0.25;\n#ifdef HAS_GAIN\nfactor = texelFetch(gain, ivec2(0), 0).x;\n#endif\n"
     "color = clamp(factor * texelFetch(radiance, ivec2(gl_FragCoord.xy), 0), 0.0, 1.0); }",
-    "sampled.frag": "#include <frame.glsl>\n" + _HEAD + _NOISE + _EXACT + "uniform sampler2D previous;\n"
+    "sampled.frag": "#include <frame.glsl>\n"
+    + _HEAD
+    + _NOISE
+    + _EXACT
+    + "uniform sampler2D previous; uniform float tint;\n"
     "out vec4 radiance; out vec4 variance; out float samples_taken; out vec4 mean;\n"
     f"void main() {{ vec4 old = texelFetch(previous, ivec2(gl_FragCoord.xy), 0); float n = old.w + 1.0;\n"
-    f"vec3 drawn = exact(v_uv) + time + {SPREAD} * sign_of(gl_FragCoord.xy, n);\n"
+    f"vec3 drawn = tint * exact(v_uv) + time + {SPREAD} * sign_of(gl_FragCoord.xy, n);\n"
     "mean = vec4(mix(old.rgb, drawn, 1.0 / n), n); radiance = vec4(mean.rgb, 1.0);\n"
     f"variance = vec4(vec3({SPREAD * SPREAD} / n), 1.0); samples_taken = 16.0 * n; }}",
 }
@@ -339,6 +352,33 @@ def test_the_truth_is_cached_and_drawn_again_only_if_it_must_be_more_exact(
         file.write_bytes(b"torn")
     compare(make.approximate(), make.truth(), frames=1, session=gl, reference_noise=0.5)
     assert len(drawn) == 4
+
+
+def test_the_truth_takes_over_what_decides_the_light_of_the_node_in_its_place(make: Maker, gl: rg.Session) -> None:
+    limits: Any = {"session": gl, "frames": 1, "reference_samples": 64}
+    pipeline, truth = make.approximate(), make.truth()
+    dark = pipeline.set("light.tint", 0.5).set("light.shade", 2).set("light.samples", 3)
+    found = compare([dark, pipeline], truth, names=["dark", "bright"], **limits)
+    assert found.notes[0] == "'truth' is drawn with light.tint=0.5, as 'dark' has it"
+    assert found.notes[1] == "measured against the truth of 'dark', with another light.tint: bright"
+    assert found.reference.light is not None
+    assert np.abs(found.reference.light - 0.5 * _exact_light()).max() < 2 * SPREAD
+    errors = [result.relative_mse or math.inf for result in found.results]
+    assert errors[0] < errors[1]
+    told = compare([dark], make(TRUTH | {"nodes": {"light": {"type": "sampled", "params": {"tint": 1}}}}), **limits)
+    assert not any("light.tint" in note for note in told.notes)  # it says itself what it is
+    assert told.reference.light is not None
+    assert np.abs(told.reference.light - _exact_light()).max() < 2 * SPREAD
+    swept = sweep(pipeline, {"light.tint": [0.5, 1]}, make.folder / "out", truth, **limits)
+    assert swept.comparison.notes[1].endswith("with another light.tint: light.tint=1")
+
+
+def test_settings_of_a_reference_follow_its_name() -> None:
+    selection = reference_selection(
+        Selection("path-traced:light.background=[0.5, 0, 0],light.max_bounces=2", sets=("a=1",))
+    )
+    assert selection == Selection("path-traced", sets=("light.background=[0.5, 0, 0]", "light.max_bounces=2"))
+    assert reference_selection(Selection("C:/truth.yaml")).source == "C:/truth.yaml"
 
 
 def test_sweeps_measure_against_the_truth_and_resume(make: Maker, gl: rg.Session, tmp_path: Path) -> None:
