@@ -130,6 +130,7 @@ class Input(Port, frozen=True, eq=False):
         filter, wrap, compare, anisotropy: the sampler.
         border: value outside the texture with `wrap="border"`; 1 by default, and 0 for comparisons.
         samples: `single`, `multi` (a multisampled texture) or `any`; a depth-test attachment takes any.
+        layered: a `texture2d` may also be an array, whose layers steps read one by one, as `port.layer(n)`.
         optional: it may stay unconnected; the shader is then compiled without `HAS_<NAME>`.
         many: it takes a list.
         use: `sample` it, attach it read-only for the `depth_test`, or load it as an `image`.
@@ -146,6 +147,7 @@ class Input(Port, frozen=True, eq=False):
     compare: bool = False
     anisotropy: Positive = 1
     samples: Literal["single", "multi", "any"] = "single"
+    layered: bool = False
     optional: bool = False
     many: bool = False
     use: Literal["sample", "depth_test", "image"] = "sample"

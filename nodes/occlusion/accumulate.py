@@ -7,6 +7,8 @@ from typing import Any
 from rendergraph.api import Any as AnyTexel
 from rendergraph.api import Depth, History, Input, Node, Normal, Output, Steps, Velocity, param
 
+from ._layers import layers_of
+
 
 class Accumulate(Node):
     """Average a noisy picture over frames, with each surface reprojected to the previous frame.
@@ -18,7 +20,7 @@ class Accumulate(Node):
     averages.
     """
 
-    source = Input(AnyTexel, doc="The noisy picture.")
+    source = Input(AnyTexel, layered=True, doc="The noisy picture, or several as layers.")
     depth = Input(Depth, doc="Window depth; positions come from it and its view.")
     normal = Input(Normal, doc="Unit normal, world space.")
     velocity = Input(Velocity, optional=True, doc="Motion vectors. Unconnected: only the camera moves.")
@@ -34,10 +36,14 @@ class Accumulate(Node):
     facing: float = param(default=0.9, min=-1, max=1, doc="Least cosine between its normals in both frames.")
 
     def record(self, steps: Steps) -> None:
-        """Record one pass over the picture."""
-        reads: dict[str, Any] = {"source": self.source, "depth": self.depth, "normal": self.normal}
+        """Record one pass over each layer of the picture; the first one keeps what the surfaces are."""
+        reads: dict[str, Any] = {"depth": self.depth, "normal": self.normal}
         if steps.connected(self.velocity):
             reads["velocity"] = self.velocity
-        reads |= {"previous_mean": self.mean.previous, "previous_surfaces": self.surfaces.previous}
-        out = {"accumulated": self.accumulated, "mean": self.mean, "surfaces": self.surfaces}
-        steps.fullscreen("accumulate.frag", out=out, **reads)
+        reads["previous_surfaces"] = self.surfaces.previous
+        layers = [layers_of(steps, part) for part in (self.source, self.accumulated, self.mean, self.mean.previous)]
+        for number, (source, accumulated, mean, previous) in enumerate(zip(*layers, strict=True)):
+            out: dict[str, Any] = {"accumulated": accumulated, "mean": mean}
+            if number == 0:
+                out["surfaces"] = self.surfaces
+            steps.fullscreen("accumulate.frag", out=out, source=source, previous_mean=previous, **reads)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from rendergraph.api import Any, Depth, Input, Internal, Node, Normal, Output, Steps, param, structural
 
+from ._layers import layers_of
+
 
 class Denoise(Node):
     """Remove noise by averaging a picture over each of its surfaces.
@@ -14,7 +16,7 @@ class Denoise(Node):
     surfaces stay sharp.
     """
 
-    source = Input(Any, doc="The noisy picture.")
+    source = Input(Any, layered=True, doc="The noisy picture, or several as layers.")
     depth = Input(Depth, doc="Window depth; positions come from it and its view.")
     normal = Input(Normal, doc="Unit normal, world space.")
     denoised = Output(like="source", doc="The picture without noise.")
@@ -31,15 +33,15 @@ class Denoise(Node):
         """Record the surfaces and the passes."""
         size = steps.desc(self.surfaces).size
         steps.fullscreen("surfaces.frag", out=self.surfaces, depth=self.depth, normal=self.normal, reduced_size=size)
-        for number in range(self.passes):
-            source = self.source if number == 0 else (self.even, self.odd)[number % 2]
-            is_last = number == self.passes - 1
-            steps.fullscreen(
-                "atrous.frag",
-                out={"filtered": self.denoised if is_last else (self.odd, self.even)[number % 2]},
-                source=source,
-                surfaces=self.surfaces,
-                screen_size=size,
-                stride=1 << number,
-                defines={"HAS_VECTOR": 1},
-            )
+        for first, last in zip(layers_of(steps, self.source), layers_of(steps, self.denoised), strict=True):
+            for number in range(self.passes):
+                is_last = number == self.passes - 1
+                steps.fullscreen(
+                    "atrous.frag",
+                    out={"filtered": last if is_last else (self.odd, self.even)[number % 2]},
+                    source=first if number == 0 else (self.even, self.odd)[number % 2],
+                    surfaces=self.surfaces,
+                    screen_size=size,
+                    stride=1 << number,
+                    defines={"HAS_VECTOR": 1},
+                )

@@ -63,7 +63,10 @@ class Checker(Struct, eq=False):
         self, draft: UnlinkedNode, port: Input | InOut, source: Port, info: TextureInfo
     ) -> Iterator[_Mismatch]:
         given, kind = port_kind(source, info), port.kind
-        follows = isinstance(port, InOut) and port.like is not None and given in TEXTURE_KINDS
+        if isinstance(port, InOut):
+            follows = port.like is not None and given in TEXTURE_KINDS
+        else:
+            follows = port.layered and given == "texture2d_array"
         if given != kind and not follows:
             yield "RG201", f"expects a {kind}", f"is a {given}", _by_kind(info, kind, port)
         elif isinstance(port.semantic, Signature):

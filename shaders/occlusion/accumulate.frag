@@ -6,13 +6,17 @@ uniform sampler2D source;
 uniform sampler2D previous_mean;
 out vec4 accumulated;
 out vec4 mean;
+#ifdef WRITES_SURFACES
 out vec4 surfaces;  // world-space normal times the number of frames in the mean; distance along the view axis
+#endif
 
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
     vec4 current = texelFetch(source, texel, 0);
     accumulated = mean = current;
+#ifdef WRITES_SURFACES
     surfaces = vec4(0.0);
+#endif
     float window_depth = texelFetch(depth, texel, 0).r;
     if (is_nothing(window_depth)) return;
     vec3 surface_normal = normalize(texelFetch(normal, texel, 0).xyz);
@@ -23,5 +27,7 @@ void main() {
     }
     float count = frames_with_current(r);
     if (r.total_weight > 0.0) accumulated = mean = mix(sum / r.total_weight, current, 1.0 / count);
+#ifdef WRITES_SURFACES
     surfaces = surface_with_count(surface_normal, count, window_depth);
+#endif
 }

@@ -85,3 +85,39 @@ def test_surfaces_are_followed_under_a_camera_that_turns(session: rg.Session, tm
         found = drawn(session, pipeline, 12, 12)[0]
         errors = [float(np.sqrt(((found[name] - exact) ** 2).mean())) for name in ("raw", "mean")]
         assert errors[1] < 0.5 * errors[0]
+
+
+LAMPS = """lights:
+  left: {type: point, at: [-3, 3, 3], intensity: 20}
+  right: {type: point, at: [3, 4, 2], intensity: 20}
+"""
+OUTPUTS = {"raw": "shadows.visibility", "mean": "over_frames.accumulated", "smooth": "smooth.denoised"}
+
+
+def test_layers_are_averaged_and_smoothed_each_for_itself(session: rg.Session, tmp_path: Path) -> None:
+    (tmp_path / "scene.yaml").write_text(SCENE.replace("BALL", "").replace("MOVES", LAMPS))
+    surfaces = {"depth": "gbuffer.depth", "normal": "gbuffer.normal"}
+    nodes: dict[str, Any] = {
+        "sun": None,
+        "shadows": {"type": "traced_shadows", "inputs": {"shadow_map": None}, "params": {"size": 1, "samples": 2}},
+        "over_frames": {"type": "accumulate", "inputs": {"source": "shadows.visibility", **surfaces}},
+        "smooth": {"type": "denoise", "inputs": {"source": "over_frames.accumulated", **surfaces}},
+        "light": {"inputs": {"visibility": "smooth.denoised"}},
+    }
+    pipeline = rg.load(
+        "deferred", scene=tmp_path / "scene.yaml", size=SIZE, patches=[{"nodes": nodes, "outputs": OUTPUTS}]
+    )
+
+    def frames(light: str) -> list[dict[str, Any]]:
+        found = session.frames(pipeline.set("shadows.light", light), outputs=list(OUTPUTS), frames=range(1, 5))
+        return [{name: np.asarray(frame[name][..., 0], np.float64) for name in OUTPUTS} for frame in found]
+
+    both, right = frames("all"), frames("right")
+    raw = np.array([frame["raw"] for frame in both])
+    assert raw.shape[1] == 2
+    assert raw.std(axis=0).max(axis=(1, 2)).min() > 0.1  # both layers are noisy
+    np.testing.assert_allclose(both[-1]["mean"], raw.mean(axis=0), atol=1e-4)
+    for name in OUTPUTS:  # the second layer is what it is alone
+        np.testing.assert_array_equal(both[-1][name][1], np.squeeze(right[-1][name]))
+    rough = [np.abs(np.diff(both[-1][name], axis=-1)).mean() for name in ("mean", "smooth")]
+    assert rough[1] < 0.9 * rough[0]
