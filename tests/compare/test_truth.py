@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from rendergraph.pipelines.references import reference_selection
 
 import rendergraph as rg
 from rendergraph.api import Depth as DepthTexel
@@ -38,7 +39,6 @@ from rendergraph.compare.results import TwinError
 from rendergraph.compare.sweepfile import read_sweep
 from rendergraph.errors import InputError, UsageError
 from rendergraph.metrics import measure, relative_mse, relative_noise, signed_difference
-from rendergraph.pipelines.references import reference_selection
 from rendergraph.session.selection import Selection
 
 SIZE = (24, 12)
