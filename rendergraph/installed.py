@@ -12,12 +12,13 @@ import os
 import re
 import sys
 from collections.abc import Iterable, Iterator
-from functools import reduce
+from functools import lru_cache, reduce
 from typing import Any
 
 from msgspec import Struct
 
 from rendergraph.errors import Problem, UsageError
+from rendergraph.stamps import Stamp, folder_names, stamp
 
 
 class Package(Struct, frozen=True):
@@ -72,12 +73,22 @@ def packages() -> dict[str, Package]:
     found: dict[str, Package] = {}
     for root in dict.fromkeys(sys.path):
         try:
-            names = sorted(name for name in os.listdir(root or ".") if name.endswith((".dist-info", ".egg-info")))
+            names = folder_names(root or ".")
         except OSError:
             continue
-        for name in [*names, *(["EGG-INFO"] if root.endswith(".egg") else [])]:
-            folder = os.path.join(root, name)
-            found.setdefault(plain(_name_and_version(folder)[0]), Package(folder))
+        for name, package in _packages_of(root, names).items():
+            found.setdefault(name, package)
+    return found
+
+
+@lru_cache
+def _packages_of(root: str, names: tuple[str, ...]) -> dict[str, Package]:
+    """The packages of a folder of `sys.path` that holds these names."""
+    found: dict[str, Package] = {}
+    metadata = [name for name in names if name.endswith((".dist-info", ".egg-info"))]
+    for name in [*metadata, *(["EGG-INFO"] if root.endswith(".egg") else [])]:
+        folder = os.path.join(root, name)
+        found.setdefault(plain(_name_and_version(folder)[0]), Package(folder))
     return found
 
 
@@ -94,13 +105,21 @@ def versions(names: Iterable[str]) -> dict[str, str | None]:
 def entry_points(*groups: str) -> Iterator[EntryPoint]:
     """Yield the entry points of all packages in groups such as `rendergraph.nodes`; nothing is imported."""
     for package in packages().values():
-        group = ""
-        for line in map(str.strip, _lines(package.folder, "entry_points.txt")):
-            if line.startswith("["):
-                group = line[1:-1].strip()
-            elif group in groups and "=" in line and line[0] not in "#;":
-                name, _, value = line.partition("=")
-                yield EntryPoint(group, name.strip(), value.strip(), package)
+        state = stamp(os.path.join(package.folder, "entry_points.txt"))
+        yield from (entry for entry in _entry_points_of(package, state) if entry.group in groups)
+
+
+@lru_cache(4096)
+def _entry_points_of(package: Package, state: Stamp) -> list[EntryPoint]:
+    """All entry points of a package whose file of them is in this state."""
+    found, group = [], ""
+    for line in map(str.strip, _lines(package.folder, "entry_points.txt") if state else ()):
+        if line.startswith("["):
+            group = line[1:-1].strip()
+        elif group and "=" in line and line[0] not in "#;":
+            name, _, value = line.partition("=")
+            found.append(EntryPoint(group, name.strip(), value.strip(), package))
+    return found
 
 
 def require(feature: str, extra: str, *modules: str) -> None:

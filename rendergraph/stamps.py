@@ -5,15 +5,18 @@ collects the reads with `track_reads` and repeats the work when `modified` names
 its reads (`unchanged`, `replay_reads`), so that an outer collection is always complete. `FileCache` does all of that.
 
 A file's state is its modification time, size and inode: one `stat` each, the same on every system; no file is read.
+A folder is listed again only if its own modification time has changed.
 """
 
 from __future__ import annotations
 
 import os
 import stat
+import time
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import lru_cache
 from pathlib import Path
 from typing import Generic, TypeAlias, TypeVar
 
@@ -26,6 +29,10 @@ Stamps: TypeAlias = "Mapping[str, Stamp]"
 """Absolute paths and their states, in the order they were read."""
 
 _SOURCES = (".py", ".frag", ".vert", ".geom", ".comp", ".glsl", ".yaml", ".yml", ".toml", "")
+_SETTLED = 2_000_000_000
+"""Nanoseconds since a folder's last change after which another change also changes its time, on every file system."""
+_NAMES: dict[str, tuple[object, tuple[str, ...]]] = {}
+"""The names in folders, with the states of the folders when they were listed."""
 _READ: ContextVar[dict[str, Stamp] | None] = ContextVar("read", default=None)
 
 
@@ -34,10 +41,23 @@ def stamp(path: Path | str) -> Stamp:
     try:
         status = os.stat(path)
         if stat.S_ISDIR(status.st_mode):
-            return tuple(sorted(name for name in os.listdir(path) if _is_source(name)))
+            return _source_names(folder_names(path, status))
     except (OSError, ValueError):
         return None
     return status.st_mtime_ns, status.st_size, status.st_ino
+
+
+def folder_names(path: Path | str, status: os.stat_result | None = None) -> tuple[str, ...]:
+    """Return the sorted names in a folder, of which `status` may be known; raises OSError."""
+    status = status or os.stat(path)
+    name, state = os.path.abspath(path), (status.st_mtime_ns, status.st_ino)
+    known = _NAMES.get(name)
+    if known is not None and known[0] == state:
+        return known[1]
+    names = tuple(sorted(os.listdir(path)))
+    if time.time_ns() - status.st_mtime_ns > _SETTLED:
+        _NAMES[name] = state, names
+    return names
 
 
 def record_read(path: Path | str) -> None:
@@ -104,5 +124,6 @@ class FileCache(Generic[T]):
         return entry[0]
 
 
-def _is_source(name: str) -> bool:
-    return name[0] not in "._" + "#" and os.path.splitext(name)[1] in _SOURCES
+@lru_cache(1024)
+def _source_names(names: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(name for name in names if name[0] not in "._#" and os.path.splitext(name)[1] in _SOURCES)

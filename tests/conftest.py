@@ -8,6 +8,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from textwrap import dedent, indent
 from typing import Any
@@ -76,6 +77,16 @@ def shared() -> Path:
     if not (folder / "reference").is_dir():
         pytest.skip("no shared reference data beside the project")
     return folder
+
+
+@pytest.fixture(scope="session", autouse=True)
+def skies() -> Iterator[None]:
+    """Keep the pictures of skies, as many tests use the same one and each takes a fifth of a second."""
+    from rendergraph.pipelines.environments import sky
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sky, "sky_picture", lru_cache(32)(sky.sky_picture))
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -13,6 +13,7 @@ import re
 import sys
 import zlib
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from rendergraph.declare.blame import describe_error, source_location
 from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
 from rendergraph.installed import EntryPoint, plain
 from rendergraph.settings import expand_home, nearest_settings
-from rendergraph.stamps import record_read
+from rendergraph.stamps import FileCache, record_read
 
 OWN = "rendergraph"
 """The distribution that no plugin replaces."""
@@ -44,6 +45,8 @@ _NO_NODE = re.compile(r"_|test_|conftest\Z")
 """Modules that are helpers, or that pytest looks for: tests may lie beside the nodes they test."""
 _STEM = re.compile(r"[A-Za-z][A-Za-z0-9_-]*\Z")
 _HEAD_BYTES = 100_000
+_MODULES: FileCache[list[tuple[str, Listed]]] = FileCache(16)
+"""The modules of installed packages."""
 
 
 class PluginPath(Struct, frozen=True):
@@ -106,10 +109,15 @@ def package(plugin: str, package: str) -> Iterator[tuple[str, Listed]]:
         return
     shaders = shader_folder(package)
     for folder in spec.submodule_search_locations:
-        yield from _modules(Path(folder), package, plugin, shaders)
+        where = Path(folder), package, plugin, shaders
+        yield from _MODULES.get(where, partial(_modules, *where))
 
 
-def _modules(folder: Path, package: str, plugin: str, shaders: Path | None) -> Iterator[tuple[str, Listed]]:
+def _modules(folder: Path, package: str, plugin: str, shaders: Path | None) -> list[tuple[str, Listed]]:
+    return list(_listed(folder, package, plugin, shaders))
+
+
+def _listed(folder: Path, package: str, plugin: str, shaders: Path | None) -> Iterator[tuple[str, Listed]]:
     files = list(_files(folder))
     has_python = any(suffix == ".py" for _, _, _, suffix in files)
     for where, family, stem, suffix in files:
@@ -144,6 +152,7 @@ def _files(folder: Path, most: float = math.inf) -> Iterator[tuple[str, str, str
 
 
 def _has_header(file: str) -> bool:
+    record_read(file)
     if not os.path.isfile(file):  # opening a pipe would block
         return False
     try:
