@@ -9,11 +9,14 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from contextvars import ContextVar
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from rendergraph import formatting
 from rendergraph.errors import Place, Problem
 from rendergraph.formatting import jsonable
+
+if TYPE_CHECKING:
+    from rendergraph.session.progress import Bar
 
 _RED, _YELLOW, _BOLD, _PLAIN = "\x1b[1;31m", "\x1b[1;33m", "\x1b[1m", "\x1b[0m"
 _CONTROL = "[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]"
@@ -146,23 +149,11 @@ def error_document(problems: Sequence[Problem], exit_code: int) -> dict[str, Any
     return {"exit_code": exit_code, "problems": [problem.as_json() for problem in problems]}
 
 
-class Progress:
-    """`frame 3 of 10` on a terminal, nothing elsewhere."""
+def progress_bar(total: int) -> Bar:
+    """Return the bar of a run of so many frames, which shows nothing but on a terminal."""
+    from rendergraph.session.progress import Bar
 
-    def __init__(self, total: int) -> None:
-        self._total = total
-        self._on = total > 1 and on_terminal()
-
-    def show(self, done: int) -> None:
-        self._print(f"\rframe {done} of {self._total}")
-
-    def clear(self) -> None:
-        self._print("\r" + " " * 40 + "\r")
-
-    def _print(self, text: str) -> None:
-        if self._on:
-            sys.stderr.write(text)
-            sys.stderr.flush()
+    return Bar("frames", shown=total > 1 and on_terminal())
 
 
 def on_terminal() -> bool:

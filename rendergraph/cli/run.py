@@ -6,14 +6,14 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from msgspec.structs import replace
 
 from rendergraph.cli import options
 from rendergraph.cli.lazy_click import click
 from rendergraph.cli.options import Target
-from rendergraph.cli.output import Progress, Warnings, emit, emit_json, say_event, say_summary
+from rendergraph.cli.output import Warnings, emit, emit_json, progress_bar, say_event, say_summary
 from rendergraph.errors import InputError, Place, Problem, UsageError
 from rendergraph.stamps import track_reads
 
@@ -27,7 +27,15 @@ if TYPE_CHECKING:
 
 @click.command("run", no_args_is_help=True)
 @options.pipeline_options
-@click.option("--frames", type=options.FRAMES, help="Frames to render; `####` in a file name becomes the number.")
+@click.option(
+    "--frames",
+    type=options.FRAMES_OR_CLIP,
+    help="Frames to render, or `clip` for the scene's motion once, as films by default; `####` in a file name becomes "
+    "the number.",
+)
+@click.option("--seconds", type=options.POSITIVE, help="Render so many seconds from frame 1 on.")
+@click.option("--turntable", is_flag=True, help="Take the camera once around its target; 4 seconds by default.")
+@click.option("--resume", is_flag=True, help="Leave out numbered frames that an interrupted run has written.")
 @click.option("--fps", type=options.POSITIVE, help="Frames per second.  [default: 30]")
 @click.option(
     "--subframes",
@@ -74,7 +82,10 @@ if TYPE_CHECKING:
 @click.option("--shuffle", type=int, metavar="SEED", help="Run the steps in another legal order.")
 def command(
     selection: Selection,
-    frames: range | None,
+    frames: range | Literal["clip"] | None,
+    seconds: float | None,
+    turntable: bool,
+    resume: bool,
     fps: float | None,
     outputs: tuple[Target, ...],
     taps: tuple[Target, ...],
@@ -91,7 +102,8 @@ def command(
 
     The extension selects the format, and the output if none is named: PNG and JPEG get `image`, EXR and HDR get
     `radiance`. Without -o the picture is PIPELINE.png in the current folder. A PNG or EXR picture written by `run` can
-    be used as PIPELINE: it contains the pipeline, camera and frame that made it. FILE.mp4 is a film of all frames.
+    be used as PIPELINE: it contains the pipeline, camera and frame that made it. FILE.mp4, .webp or .gif is a film of
+    all frames, by default as long as the scene's motion.
     With --executor several processes or machines share the frames; the pictures are the same.
 
     \b
@@ -101,18 +113,25 @@ def command(
       rendergraph run forward -s display.exposure=-2 -o image=dark.jpg --tap sun.shadow_map=depth.exr
       rendergraph run forward --tap-all inside
       rendergraph run forward --frames 1-3 --size 320x180 -o turn.####.png
+      rendergraph run forward --scene salamander --size 160x90 --seconds 0.2 -o walk.mp4
       rendergraph run forward --frames 1-12 --size 64x36 --executor processes:2 -o turn.####.png
       rendergraph run my.yaml --watch
       rendergraph run spheres.exr -s display.exposure=-1 -o darker.png
     """
+    from rendergraph.images.video import is_film
     from rendergraph.session import RenderOptions
+    from rendergraph.session.films import film_frames
     from rendergraph.session.gpu import Gpu
 
     def render_options(linked: Linked) -> RenderOptions:
-        return RenderOptions(frames or linked.frames, fps or linked.fps, timed=as_json, **modes)
+        number, rate = linked.frames, fps or linked.fps
+        if frames or seconds or turntable or any(is_film(target.path) for target in outputs):
+            number = film_frames(linked.scene, rate, frames, seconds, turntable=turntable)
+        modes["turntable"] = number if turntable else None
+        return RenderOptions(number, rate, timed=as_json, **modes)
 
     warnings = Warnings()
-    read = partial(_read, selection, render_options, outputs, taps, tap_all, warnings)
+    read = partial(_read, selection, render_options, outputs, taps, tap_all, warnings, resume=resume)
     draw = partial(_draw, sheet=tap_all, warnings=warnings, quiet=as_json)
     if watch:
         if executor is not None:
@@ -148,11 +167,14 @@ def _read(
     taps: tuple[Target, ...],
     tap_all: Path | None,
     warnings: Warnings,
+    *,
+    resume: bool,
 ) -> tuple[Expanded, list[Target]]:
     """Do everything that needs no GL device: return the expanded pipeline, and the output files by their names."""
     from rendergraph import images
     from rendergraph.images.video import is_film
     from rendergraph.session import stages
+    from rendergraph.session.films import standstill_warning
     from rendergraph.session.outputs import every_port, figures
 
     with track_reads() as files:
@@ -182,7 +204,32 @@ def _read(
     if tap_all is not None:
         _make_folder(tap_all)
     _check(targets, expanded, map(Path, files))
-    return expanded, targets
+    warnings.say(standstill_warning(expanded))
+    return (_resumed(expanded, targets) if resume else expanded), targets
+
+
+def _resumed(expanded: Expanded, targets: Sequence[Target]) -> Expanded:
+    """Return the same from the first frame on of which a file is missing."""
+    from rendergraph.images import is_numbered, numbered
+    from rendergraph.session.picture_metadata import metadata, pipeline_metadata
+
+    if single := next((target for target in targets if not is_numbered(target.path)), None):
+        text = f"--resume continues numbered frames, and '{single.path}' has no `####`; leave one of them out"
+        raise UsageError(Problem("RG500", text))
+    frames = expanded.options.frames
+    own = pipeline_metadata(expanded.linked)["rendergraph:pipeline"]
+    for number in frames:
+        paths = [numbered(target.path, number) for target in targets]
+        if not all(path.is_file() for path in paths):
+            frames = frames[frames.index(number) :]
+            break
+        for path in paths:
+            if path.suffix.lower() in (".png", ".exr") and metadata(path)["pipeline"] != own:
+                text = "is a picture of another pipeline; without --resume all frames are rendered again"
+                raise InputError(Problem("RG512", text, Place(str(path))))
+    else:
+        frames = frames[-1:]  # everything is there; the report is that of the last one
+    return replace(expanded, options=replace(expanded.options, frames=frames))
 
 
 def _default(source: str, ending: str) -> Path:
@@ -219,7 +266,7 @@ def _draw(
     contact = "contact.####.png" if len(expanded.options.frames) > 1 else "contact.png"
     pictures = [target for target in targets if not is_film(target.path)]
     moving = [target for target in targets if is_film(target.path)]
-    progress = Progress(len(expanded.options.frames))
+    progress = progress_bar(len(expanded.options.frames))
     frame: Frame | None = None
     suspect: Frame | None = None
     with films([target.path for target in moving], expanded.options.fps, expanded.options.frames[0]) as open_films:
@@ -240,7 +287,7 @@ def _draw(
                 written.append(str(file.path))
                 if not quiet:
                     emit(str(file.path))
-            progress.show(done)
+            progress(done, len(expanded.options.frames))
             suspect = suspect or (frame if frame.unsound else None)
     progress.clear()
     for target in moving:
@@ -276,8 +323,7 @@ def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path])
     """Refuse output files that cannot be written, before anything is rendered; `files` are those that were read."""
     from rendergraph import images
     from rendergraph.images.saving import extension
-    from rendergraph.images.video import is_film
-    from rendergraph.installed import require
+    from rendergraph.images.video import check_film, is_film
 
     linked, numbers = expanded.linked, expanded.options.frames
     for name, port in expanded.requests.items():
@@ -290,7 +336,7 @@ def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path])
     seen: set[str] = set()
     for target in targets:
         if is_film(target.path):
-            require("an .mp4", "video", "imageio_ffmpeg")
+            check_film(target.path)
         else:
             extension(target.path)
         place = os.path.realpath(target.path)
@@ -321,7 +367,7 @@ def draw_in_parts(
     files = [FrameFile(t.name, "" if is_film(t.path) else t.path.suffix, t.is_tap) for t in targets]
     chunks = split_frames(expanded, files, farm.workers, None if warm_up is None else int(warm_up.plain()))
     frames, written = expanded.options.frames, dict[int, list[str]]()
-    progress, lasts = Progress(len(frames)), list["Frame"]()
+    progress, lasts = progress_bar(len(frames)), list["Frame"]()
     with films([t.path for t in targets if is_film(t.path)], expanded.options.fps, frames[0]) as open_films:
         for item in render_chunks(farm, chunks):
             if not isinstance(item, RenderedFrame):
@@ -338,7 +384,7 @@ def draw_in_parts(
                 if not quiet:
                     progress.clear()
                     emit(str(path))
-            progress.show(len(written))
+            progress(len(written), len(frames))
             if quiet:
                 say_event({"event": "frame", "frame": item.number, "done": len(written), "of": len(frames)})
     progress.clear()

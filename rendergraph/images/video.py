@@ -1,4 +1,4 @@
-"""Films: frames as an MP4, encoded by the ffmpeg that imageio-ffmpeg brings."""
+"""Films: frames as MP4, WebP or GIF, encoded by the ffmpeg that imageio-ffmpeg brings."""
 
 from __future__ import annotations
 
@@ -12,14 +12,37 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.errors import Place, Problem, RenderError
+from rendergraph.errors import Place, Problem, RenderError, UsageError, suggestion
 from rendergraph.images.files import flush
+from rendergraph.images.saving import check_target
+from rendergraph.installed import require
 
-ENDING = ".mp4"
+_EVEN = "pad=ceil(iw/2)*2:ceil(ih/2)*2"
+_PALETTE = "split[a][b];[a]palettegen=stats_mode=full[p];[b][p]paletteuse=dither=sierra2_4a"
+ENDINGS: dict[str, tuple[str, str, tuple[str, ...]]] = {
+    ".mp4": ("libx264", "yuv420p", ("-vf", _EVEN, "-crf", "18", "-f", "mp4")),
+    ".webp": ("libwebp_anim", "yuva420p", ("-quality", "90", "-loop", "0", "-f", "webp")),
+    ".gif": ("gif", "pal8", ("-filter_complex", _PALETTE, "-loop", "0", "-f", "gif")),
+}
+"""The codec of each kind of film, the format of its pixels, and further options of ffmpeg.
+
+H.264 with 4:2:0 colours is what every player shows; odd sides grow by a row of black. The others repeat for ever; a GIF
+has 256 colours of its own.
+"""
 
 
 def is_film(path: Path) -> bool:
-    return path.suffix.lower() == ENDING
+    return path.suffix.lower() in ENDINGS
+
+
+def check_film(path: Path) -> Path:
+    """Return the path of a film that can be written, else raise."""
+    if not is_film(path):
+        hint = suggestion(path.suffix, ENDINGS)
+        raise UsageError(Problem("RG501", f"'{path.suffix}' films are not written{hint}"))
+    require(f"{path.suffix} (a film)", "video", "imageio_ffmpeg")
+    check_target(path)
+    return path
 
 
 @contextmanager
@@ -36,10 +59,7 @@ def films(paths: Iterable[Path], fps: float, first: int) -> Iterator[dict[Path, 
 
 
 class Film:
-    """A file of frames, added in any order, that appears when it is complete.
-
-    H.264 with 4:2:0 colours, which every player shows: odd sides grow by a row of black.
-    """
+    """A file of frames, added in any order, that appears when it is complete; the extension says of which kind."""
 
     def __init__(self, path: Path, fps: float, first: int) -> None:
         """Prepare a film of `fps` frames a second that begins with frame number `first`."""
@@ -62,14 +82,15 @@ class Film:
             imageio_ffmpeg: Any = import_module("imageio_ffmpeg")  # an extra, of which little is typed
 
             height, width = pixels.shape[:2]
+            codec, pixel_format, more = ENDINGS[self.path.suffix.lower()]
             self._writer = imageio_ffmpeg.write_frames(
                 str(self._part),
                 (width, height),
                 fps=self._fps,
-                codec="libx264",
-                pix_fmt_out="yuv420p",
+                codec=codec,
+                pix_fmt_out=pixel_format,
                 macro_block_size=1,
-                output_params=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-crf", "18", "-f", "mp4"],
+                output_params=list(more),
                 ffmpeg_log_level="error",
             )
             self._writer.send(None)

@@ -66,6 +66,14 @@ def moves(scene: Scene) -> bool:
     return bool(scene.keyframes) or scene.orbit is not None or any(rig.length for rig in scene.rigs)
 
 
+def length(scene: Scene) -> float:
+    """Return the seconds until clips and keyframes end, or an orbit closes; 0 where nothing moves."""
+    ends = [rig.length for rig in scene.rigs]
+    ends += [frames[-1][0] for frames in scene.keyframes.values()]
+    orbit = abs(scene.orbit.degrees_per_second) if scene.orbit is not None else 0.0
+    return max(ends, default=0.0) or (360.0 / orbit if orbit else 0.0)
+
+
 def play(scene: Scene, clip: str | None = None, speed: float = 1.0, start: float = 0.0) -> Scene:
     """Return the scene of an animated file with a clip playing, by default its first one, as it is at first."""
     (rig,) = scene.rigs
@@ -167,7 +175,7 @@ def _orbited(scene: Scene, time_s: float, placed: Scene) -> Scene:
         return scene
     camera = scene.cameras[name]
     target = camera.target or bounding_sphere(placed)[0]
-    angle = math.radians(scene.orbit.degrees_per_second * time_s)
+    angle = math.radians(scene.orbit.degrees_per_second * (time_s - scene.orbit.begin))
     c, s = math.cos(angle), math.sin(angle)
     turn = np.array([[c, 0, s, 0], [0, 1, 0, 0], [-s, 0, c, 0], [0, 0, 0, 1]])
     transform = translation(target) @ turn @ translation([-value for value in target]) @ camera.transform

@@ -85,6 +85,19 @@ def described_camera(text: str, other: Camera) -> Camera:
         raise InputError(Problem("RG321", f"camera: {problem}", here)) from None
 
 
+def camera_words(camera: Camera) -> str:
+    """Return the text of which `described_camera` makes this camera, whatever the other one is."""
+    _, up, back, eye = (vec3(camera.transform[:3, column]) for column in range(4))
+    lens = {"perspective": math.degrees(camera.fov_y), "orthographic": camera.height}.get(camera.type, camera.frustum)
+    name = {"perspective": "fov", "orthographic": "height"}.get(camera.type, "frustum")
+    target = tuple(a - b for a, b in zip(eye, back, strict=True))
+    values = {"eye": eye, "target": target, "up": up, name: lens, "near": camera.near, "far": camera.far}
+    texts = {
+        key: ",".join(map(repr, value)) if isinstance(value, tuple) else repr(value) for key, value in values.items()
+    }
+    return " ".join(f"{key}={text}" for key, text in texts.items()).replace("far=inf", "far=.inf")
+
+
 def bounding_sphere(scene: Scene) -> tuple[Vec3, float]:
     low, high = (np.array(corner) for corner in scene.bounds)
     return vec3((low + high) / 2), max(float(np.linalg.norm(high - low)) / 2, 1e-6)

@@ -376,10 +376,14 @@ class Environment(Struct, frozen=True):
 
 
 class Orbit(Struct, frozen=True):
-    """A camera that turns about its target, counter-clockwise seen from above; the default one where unnamed."""
+    """A camera that turns about its target, counter-clockwise seen from above; the default one where unnamed.
+
+    At the time `begin`, in seconds, it is where it stands.
+    """
 
     camera: str
     degrees_per_second: float
+    begin: float = 0.0
 
 
 class Placement(Struct, frozen=True, eq=False):

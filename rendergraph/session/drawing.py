@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import cached_property
 from time import perf_counter
 from typing import Any
@@ -17,7 +17,7 @@ from rendergraph.images import PictureInfo, channel_names
 from rendergraph.installed import versions
 from rendergraph.program import ray_warnings
 from rendergraph.scene import animate
-from rendergraph.scene.cameras import view_matrices
+from rendergraph.scene.cameras import camera_words, view_matrices
 from rendergraph.scene.model import Camera, Scene
 from rendergraph.session.frame import Frame, OutputInfo
 from rendergraph.session.gpu import Gpu
@@ -167,10 +167,16 @@ class Drawing(Struct, eq=False, dict=True):
             types={node: graph[node].type.name for node in self._rendering_nodes},
             memory=plan.memory.as_json(),
             culled=dict(plan.schedule.culled),
-            metadata={**self._metadata, **frame_metadata(self.number, self.expanded.options.fps)},
+            metadata=self._metadata | frame_metadata(self.number, self.expanded.options.fps) | self._turned_camera(),
             times=tuple(self.times),
             warnings=(*dict.fromkeys(self.gpu.cache.image_warnings), *self._frame_warnings(), *self._ray_notes),
         )
+
+    def _turned_camera(self) -> dict[str, str]:
+        """The camera of a turntable in words: the pipeline's own stands elsewhere."""
+        if self.expanded.options.turntable is None or self.camera is None:
+            return {}
+        return {"rendergraph:camera": camera_words(self.camera)}
 
     def _frame_warnings(self) -> Iterator[Problem]:
         """Yield warnings about frames that show less than was asked for."""
@@ -198,7 +204,7 @@ class Drawing(Struct, eq=False, dict=True):
         return (*(node for node in self.runner.updating if node not in drawing), *drawing)
 
     @cached_property
-    def _metadata(self) -> Mapping[str, str]:
+    def _metadata(self) -> dict[str, str]:
         found = {"rendergraph": __version__} | versions(("moderngl", "numpy", "OpenImageIO"))
         device = self.gpu.device
         return {

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, Unpack
 
 from msgspec import structs
 
@@ -271,6 +271,52 @@ class Pipeline:
                 yield from stages.draw(expanded, gpu)
 
         return rendered()
+
+    def film(
+        self,
+        path: str | Path,
+        frames: range | Literal["clip"] | None = None,
+        seconds: float | None = None,
+        turntable: bool = False,
+        fps: float = 30,
+        *,
+        session: Gpu | None = None,
+        device: int | None = None,
+        progress: Progress | bool | None = None,
+        **options: Any,
+    ) -> Path:
+        """Render the picture `image` as a film: .mp4, .webp or .gif; without `frames` and `seconds` the motion once.
+
+        Args:
+            path: of the film, which appears when it is complete.
+            frames: their numbers, or `clip` for the scene's motion once.
+            seconds: length, from frame 1 on, in place of `frames`.
+            turntable: take the camera once around its target, in 4 seconds by default.
+            fps: frames per second.
+            session, device, progress: as for `render`.
+            options: the other fields of `RenderOptions`.
+
+        Raises:
+            UsageError: no film has that extension, the encoder is not installed, or the length is contradictory.
+        """
+        from rendergraph import images
+        from rendergraph.images.video import check_film, films
+        from rendergraph.session.films import film_frames
+        from rendergraph.session.gpu import opened
+
+        path = check_film(Path(path))
+        numbers = film_frames(self.link().scene, fps, frames, seconds, turntable=turntable)
+        options = {"outputs": ["image"], **options, "turntable": numbers if turntable else None}
+        expanded = self.expand(frames=numbers, fps=fps, **options)
+        with (
+            films([path], fps, numbers[0]) as made,
+            opened(session, device) as gpu,
+            report_progress(progress, "frames") as tell,
+        ):
+            for done, frame in enumerate(stages.draw(expanded, gpu), start=1):
+                made[path].add(frame.number, images.viewable_as(frame["image"], frame.info("image")))
+                tell(done, len(numbers))
+        return path
 
     def _repr_html_(self) -> str:
         from rendergraph.diagrams import svg

@@ -28,24 +28,40 @@ def report_progress(progress: Progress | bool | None, word: str) -> Iterator[Pro
     if not progress or sys.stderr is None:
         yield _ignore
         return
-    longest, begun, before = 0, time.monotonic(), 0
-
-    def bar(done: int, total: int) -> None:
-        nonlocal longest, begun, before
-        if before == 0:  # what was there already took no time
-            begun, before = time.monotonic(), done
-        full = _WIDTH * done // max(1, total)
-        text = f"{'█' * full}{'·' * (_WIDTH - full)} {done} of {total} {word}"
-        text += _pace(done - before, total - done, time.monotonic() - begun)
-        longest = max(longest, len(text))
-        encoding = getattr(sys.stderr, "encoding", None) or "utf-8"
-        sys.stderr.write("\r" + text.encode(encoding, "replace").decode(encoding))
-        sys.stderr.flush()
-
+    bar = Bar(word)
     try:
         yield bar
     finally:
-        sys.stderr.write("\r" + " " * longest + "\r")
+        bar.clear()
+
+
+class Bar:
+    """A bar on stderr with the speed and the remaining time; `word` is the unit of the numbers."""
+
+    def __init__(self, word: str, *, shown: bool = True) -> None:
+        self._shown = shown and sys.stderr is not None
+        self._word, self._longest, self._begun, self._before = word, 0, time.monotonic(), -1
+
+    def __call__(self, done: int, total: int) -> None:
+        """Draw it anew."""
+        if not self._shown:
+            return
+        if self._before < 0:  # what was there already took no time
+            self._begun, self._before = time.monotonic(), done
+        full = _WIDTH * done // max(1, total)
+        text = f"{'█' * full}{'·' * (_WIDTH - full)} {done} of {total} {self._word}"
+        text += _pace(done - self._before, total - done, time.monotonic() - self._begun)
+        self._longest = max(self._longest, len(text))
+        encoding = getattr(sys.stderr, "encoding", None) or "utf-8"
+        self._print(text.encode(encoding, "replace").decode(encoding))
+
+    def clear(self) -> None:
+        """Take the bar away, before something else is printed."""
+        if self._longest:
+            self._print(" " * self._longest + "\r")
+
+    def _print(self, text: str) -> None:
+        sys.stderr.write("\r" + text)
         sys.stderr.flush()
 
 

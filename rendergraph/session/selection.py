@@ -129,6 +129,7 @@ class RenderKeywords(TypedDict, total=False):
     cull: bool
     still: int | None
     subframes: int
+    turntable: range | None
 
 
 class RenderOptions(Struct, frozen=True):
@@ -151,6 +152,7 @@ class RenderOptions(Struct, frozen=True):
         still: a frame after which the scene, the camera and the time stay as they are, so that pictures accumulate.
         subframes: number of moments while the camera's shutter is open, centred on the frame's, of whose light a frame
             is the mean. Histories advance once a frame.
+        turntable: the frames in which the camera goes around its target once.
     """
 
     frames: range = range(1, 2)
@@ -167,6 +169,7 @@ class RenderOptions(Struct, frozen=True):
     cull: bool = True
     still: int | None = None
     subframes: int = 1
+    turntable: range | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.frames, range) or not self.frames or min(self.frames[0], self.frames[-1]) < 1:

@@ -30,6 +30,7 @@ from rendergraph.scene.animate import complete
 from rendergraph.scene.facts import camera_facts, environment_facts, light_facts, material_facts, object_facts
 from rendergraph.scene.model import Scene
 from rendergraph.scene.scene_data import scene_data_facts
+from rendergraph.session.films import on_turntable
 from rendergraph.session.outputs import every_port, requested_outputs
 from rendergraph.session.picture_metadata import PictureMetadata, is_picture, read_picture_metadata
 from rendergraph.session.scenes import scene_of
@@ -149,6 +150,8 @@ def expand(linked: Linked, options: RenderOptions = RenderOptions()) -> Expanded
     if options.subframes > 1:  # they blur; nodes that imitate the shutter have nothing to do
         graph = linked.graph
         linked = replace(linked, graph=replace(graph, camera=replace(graph.camera, shutter=0.0)))
+    if options.turntable:
+        linked = replace(linked, scene=on_turntable(linked.scene, options.fps, options.turntable))
     requests = requested_outputs(linked.graph, options)
     ends = {name: port.end for name, port in requests.items()}
     return Expanded(linked, options, requests, rendergraph.expand.expand(linked.graph, ends))

@@ -15,6 +15,7 @@ import pytest
 from msgspec.structs import asdict
 
 from rendergraph.cli.app import main
+from rendergraph.scene.model import Orbit, Scene
 from rendergraph.session import RenderOptions, Selection
 
 
@@ -65,7 +66,12 @@ class FakeStages:
 
     def link(self, resolved: Any) -> Any:
         return SimpleNamespace(
-            selection=resolved.selection, graph=self.graph, warnings=(), frames=range(1, 2), fps=30.0
+            selection=resolved.selection,
+            graph=self.graph,
+            warnings=(),
+            frames=range(1, 2),
+            fps=30.0,
+            scene=Scene("moving", orbit=Orbit("", 30)),
         )
 
     def expand(self, linked: Any, options: RenderOptions) -> Any:
