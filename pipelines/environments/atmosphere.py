@@ -145,13 +145,13 @@ def _scattering_table(air: Atmosphere) -> Array:
     i, j = np.meshgrid(np.arange(8), np.arange(8), indexing="ij")
     z = (1 - 2 * (i + 0.5) / 8).ravel().astype(np.float32)
     around = (2 * np.pi * (j + 0.5) / 8).ravel().astype(np.float32)
-    shape = (16, 24, 64)
-    r, s, up = (np.broadcast_to(a, shape) for a in (radius[:, None, None], sun_up[:, None], z))
+    r, s, up = radius[:, None, None], sun_up[None, :, None], z[None, None, :]  # most depends on r and up alone
     cosine = up * s + np.sqrt(np.maximum((1 - up**2) * (1 - s**2), 0)) * np.cos(around)
     # Sunlight scattered once by isotropic phase functions, and how much of any light is scattered on.
     to_ground = _distance_to(GROUND, r, up, near=True)
     length = np.where(np.isfinite(to_ground), to_ground, _distance_to(TOP, r, up))
-    light, again, through = (np.full((*shape, 3), value, np.float32) for value in (0, 0, 1))
+    light = np.zeros((16, 24, 64, 3), np.float32)
+    again, through = (np.full((16, 1, 64, 3), value, np.float32) for value in (0, 1))
     for step in range(_STEPS // 2):
         t, span = length * (step + 0.5) / (_STEPS // 2), length / (_STEPS // 2)
         here = np.sqrt(r**2 + t**2 + 2 * r * t * up)
@@ -224,6 +224,6 @@ def lookup(table: Array, row: Array, column: Array) -> Array:
     y0, x0 = np.minimum(y.astype(np.int32), height - 2), np.minimum(x.astype(np.int32), width - 2)
     fy, fx = (y - y0)[..., None].astype(np.float32), (x - x0)[..., None].astype(np.float32)
     flat, at = table.reshape(-1, 3), y0 * width + x0
-    above = flat[at] * (1 - fx) + flat[at + 1] * fx
-    below = flat[at + width] * (1 - fx) + flat[at + width + 1] * fx
+    above = flat.take(at, 0) * (1 - fx) + flat.take(at + 1, 0) * fx
+    below = flat.take(at + width, 0) * (1 - fx) + flat.take(at + width + 1, 0) * fx
     return np.asarray(above * (1 - fy) + below * fy, np.float32)
