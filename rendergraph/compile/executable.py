@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from rendergraph.allocate import ResourcePlan
     from rendergraph.compile.culling import SceneView
     from rendergraph.compile.gpu_scene import GpuScene
-    from rendergraph.compile.light_means import LightMeans
     from rendergraph.compile.memory import Memory
     from rendergraph.compile.uploads import UploadedValues
     from rendergraph.compile.views import ViewBuffers
@@ -160,7 +159,7 @@ class Executable(Struct, eq=False, dict=True):
         fresh: `statics` have to be written and everything bound before the next frame.
         uses_previous: a program looks at where things were in the frame before.
         shares_kept: what they make may be taken over from other pipelines, and by those.
-        means: of light over the moments of a frame, once a frame has several.
+        means: the `LightMeans` of the moments of a frame, once a frame has several.
     """
 
     device: Device
@@ -183,7 +182,7 @@ class Executable(Struct, eq=False, dict=True):
     uses_previous: bool = False
     has_new_kept: bool = False
     shares_kept: bool = True
-    means: LightMeans | None = None
+    means: Any = None
     contents: dict[str, bytes] = field(default_factory=dict)
     stale: set[str] = field(default_factory=set)
     touched: set[Source] = field(default_factory=set)

@@ -14,7 +14,7 @@ from msgspec.structs import astuple, replace
 from rendergraph.errors import InputError, Option, Place, Problem, suggestion
 from rendergraph.facts import NO_EXTRA, Extra
 from rendergraph.scene import scene_values
-from rendergraph.scene.cameras import WIDE, bounding_sphere, described_camera, framing_camera
+from rendergraph.scene.cameras import WIDE, bounding_sphere, framing_camera
 from rendergraph.scene.geometry import rigid, translation
 from rendergraph.scene.model import Matrix, Placement, Scene
 from rendergraph.scene.surroundings import grounded, lit
@@ -52,6 +52,8 @@ def complete(
         changed = {key: {**values, "shutter": shutter} for key, values in scene.recipe.items() if key[0] == "cameras"}
         scene = replace(scene, recipe={**scene.recipe, **changed})
     if camera_name is not None and "=" in camera_name:
+        from rendergraph.scene.camera_words import described_camera  # few cameras are
+
         cameras = {"camera": described_camera(camera_name, next(iter(cameras.values()))), **cameras}
     elif camera_name is not None:
         if camera_name not in cameras:

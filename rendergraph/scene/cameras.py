@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import re
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -12,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from rendergraph import projection
-from rendergraph.errors import InputError, Option, Place, Problem
 from rendergraph.scene.geometry import vec3
 from rendergraph.scene.model import Camera, Matrix, Scene, Vec3
 from rendergraph.steps import ViewMatrices
@@ -46,56 +43,6 @@ def projection_matrix(camera: Camera, aspect: float) -> Matrix:
     if camera.type == "frustum" and camera.frustum is not None:
         return projection.frustum(*camera.frustum, near, far)
     return projection.perspective(camera.fov_y, aspect, near, far)
-
-
-def described_camera(text: str, other: Camera) -> Camera:
-    """Return the camera of a text, `eye=0,1,5 target=0,1,0 fov=40`; what it does not say is that of another.
-
-    The keys are those of a scene file's cameras, and `fov` for `fov_y_degrees`.
-    """
-    from rendergraph.document import parse  # not needed for most pictures
-    from rendergraph.keys import Key, Validator, plain
-    from rendergraph.scene import scene_keys, scene_values
-
-    words = [word.partition("=")[::2] for word in text.split()]
-    keys = [(re.sub(r"^fov$", "fov_y_degrees", name), f"[{v}]" if "," in v else v) for name, v in words]
-    here = Place(Option("--camera", text))
-    validator = Validator(scene_keys.CODES)
-    try:
-        root = parse("".join(f"{json.dumps(name)}: {value}\n" for name, value in keys), "--camera").root
-        valid = validator.value(root, Key("camera", scene_keys.CAMERA, ""))
-        if validator.problems or valid is None:
-            raise InputError(validator.problems)
-        values = plain(valid, scene_keys.CAMERA)
-        x, y, z = other.transform[:3, 3]
-        given = {
-            "eye": (x, y, z),
-            "target": other.target or vec3(other.transform[:3, 3] - other.transform[:3, 2]),
-            "near": other.near,
-            "far": other.far,
-            "shutter": other.shutter,
-        }
-        if values.keys().isdisjoint(("fov_y_degrees", "height", "frustum")):
-            kind = {"perspective": "fov_y_degrees", "orthographic": "height", "frustum": "frustum"}[other.type]
-            given[kind] = {"fov_y_degrees": math.degrees(other.fov_y), "height": other.height}.get(kind, other.frustum)
-        return scene_values.camera("camera", given | values)
-    except InputError as error:
-        raise InputError([problem.relocate(here) for problem in error.problems]) from None
-    except ValueError as problem:
-        raise InputError(Problem("RG321", f"camera: {problem}", here)) from None
-
-
-def camera_words(camera: Camera) -> str:
-    """Return the text of which `described_camera` makes this camera, whatever the other one is."""
-    _, up, back, eye = (vec3(camera.transform[:3, column]) for column in range(4))
-    lens = {"perspective": math.degrees(camera.fov_y), "orthographic": camera.height}.get(camera.type, camera.frustum)
-    name = {"perspective": "fov", "orthographic": "height"}.get(camera.type, "frustum")
-    target = tuple(a - b for a, b in zip(eye, back, strict=True))
-    values = {"eye": eye, "target": target, "up": up, name: lens, "near": camera.near, "far": camera.far}
-    texts = {
-        key: ",".join(map(repr, value)) if isinstance(value, tuple) else repr(value) for key, value in values.items()
-    }
-    return " ".join(f"{key}={text}" for key, text in texts.items()).replace("far=inf", "far=.inf")
 
 
 def bounding_sphere(scene: Scene) -> tuple[Vec3, float]:

@@ -17,7 +17,7 @@ from rendergraph.images import PictureInfo, channel_names
 from rendergraph.installed import versions
 from rendergraph.program import ray_warnings
 from rendergraph.scene import animate
-from rendergraph.scene.cameras import camera_words, view_matrices
+from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import Camera, Scene
 from rendergraph.session.frame import Frame, OutputInfo
 from rendergraph.session.gpu import Gpu
@@ -176,6 +176,8 @@ class Drawing(Struct, eq=False, dict=True):
         """The camera of a turntable in words: the pipeline's own stands elsewhere."""
         if self.expanded.options.turntable is None or self.camera is None:
             return {}
+        from rendergraph.scene.camera_words import camera_words  # few cameras are put in words
+
         return {"rendergraph:camera": camera_words(self.camera)}
 
     def _frame_warnings(self) -> Iterator[Problem]:
