@@ -14,8 +14,10 @@ from rendergraph.lazy import lazy_exports
 from rendergraph.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from rendergraph.compare import sweep
+    from rendergraph.compare import Comparison, Result, Sweep, compare, sweep
+    from rendergraph.diff import diff
     from rendergraph.errors import RendergraphError
+    from rendergraph.metrics import flip
     from rendergraph.session import Frame, Pipeline, RenderOptions, Selection, Session, load, loads
     from rendergraph.session.python_values import Mesh, Object, Scene
     from rendergraph.settings import CacheLimits
@@ -27,15 +29,21 @@ if os.path.isfile(os.path.join(_around, "pyproject.toml")) and os.path.isdir(os.
 
 __all__ = [
     "CacheLimits",
+    "Comparison",
     "Frame",
     "Mesh",
     "Object",
     "Pipeline",
     "RenderOptions",
     "RendergraphError",
+    "Result",
     "Scene",
     "Selection",
     "Session",
+    "Sweep",
+    "compare",
+    "diff",
+    "flip",
     "load",
     "loads",
     "sweep",
@@ -45,7 +53,9 @@ __all__ = [
 __getattr__, __dir__ = lazy_exports(
     __name__,
     {
-        "compare": ("sweep",),
+        "compare": ("Comparison", "Result", "Sweep", "compare", "sweep"),
+        "diff": ("diff",),
+        "metrics": ("flip",),
         "errors": ("RendergraphError",),
         "session": ("Frame", "Pipeline", "RenderOptions", "Selection", "Session", "load", "loads"),
         "session.python_values": ("Mesh", "Object", "Scene"),

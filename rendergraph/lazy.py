@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from types import ModuleType
 from typing import Any
 
 
@@ -20,3 +21,10 @@ def lazy_exports(
         return getattr(importlib.import_module(f".{module_of[name]}", package), name)
 
     return load, lambda: list(module_of)
+
+
+class CallableModule(ModuleType):
+    """A package that stands for the function of its own name, too: `rendergraph.compare(…)`."""
+
+    def __call__(self, *arguments: Any, **keywords: Any) -> Any:
+        return getattr(self, self.__name__.rpartition(".")[2])(*arguments, **keywords)

@@ -16,6 +16,7 @@ from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import emit, emit_json, on_terminal, say, table, warn
 from rendergraph.errors import InputError, Option, Place, Problem, UsageError, suggestion
 from rendergraph.formatting import format_bytes
+from rendergraph.installed import require
 
 if TYPE_CHECKING:
     from rendergraph.compare.results import Comparison, Result
@@ -52,6 +53,17 @@ def check_thresholds(thresholds: Sequence[Threshold], extensions: Extensions) ->
     for metric in dict.fromkeys(one.metric for one in thresholds if one.metric not in names):
         text = f"--fail-above: unknown metric '{metric}'{suggestion(metric, names)}"
         raise UsageError([Problem("RG500", text), *extensions.problems])
+
+
+_FIGURES = (".pdf", ".svg", ".png")
+
+
+def _crop(text: str) -> tuple[int, int, int, int]:
+    numbers = [int(part) for part in text.split(",") if part.strip().isdigit()]
+    if len(numbers) != 4:
+        raise ValueError(f"expected left, top, width and height in pixels, as in 40,20,32,32, got '{text}'")
+    x, y, width, height = numbers
+    return x, y, width, height
 
 
 reference_option = click.option(
@@ -127,13 +139,27 @@ report_options = options.together(
 @options.selection_options
 @click.option("-n", "--frames", type=click.IntRange(1, 10_000), default=10, show_default=True, help="Measured frames.")
 @at_option
-@click.option("-o", "--output", type=options.NamedPath(dir_okay=False), metavar="FILE", help="Write a report, HTML.")
+@click.option(
+    "-o",
+    "--output",
+    type=options.NamedPath(dir_okay=False),
+    metavar="FILE",
+    help="Write a report (.html), a figure (.pdf, .svg, .png), or a table (.tex, .csv).",
+)
+@click.option(
+    "--crop",
+    "crops",
+    multiple=True,
+    type=options.Parsed("X,Y,W,H", _crop),
+    help="Magnify this part of the picture in a figure: left, top, width and height in pixels.",
+)
 @report_options
 def command(
     pipelines: tuple[str, ...],
     withs: tuple[tuple[str, ...], ...],
     reference: str | None,
     output: Path | None,
+    crops: tuple[tuple[int, int, int, int], ...],
     thresholds: tuple[Threshold, ...],
     title: str,
     note: str,
@@ -164,7 +190,9 @@ def command(
         ways = "name another, a --reference, or settings: --with NODE.PARAM=VALUE"
         raise UsageError(Problem("RG500", f"there is only one pipeline and nothing to compare it with; {ways}"))
     if output is not None:
-        check_page(output)
+        check_page(output, (".html", ".htm", *_FIGURES, ".tex", ".csv"))
+        if output.suffix.lower() in _FIGURES:
+            require("a figure", "figures", "matplotlib")
     elif title or note:
         raise UsageError(Problem("RG500", "--title and --note belong to a report; write one: -o report.html"))
     if not withs and settings["metric"] is None and _are_pictures(pipelines, reference, select):
@@ -187,9 +215,7 @@ def command(
         say(line)
     beyond = exceeded(comparison.results, thresholds)
     if output is not None:
-        from rendergraph.compare.report import comparison_page
-
-        options.write(comparison_page(comparison, options.command_line(), title=title, note=note), output)
+        _write(comparison, output, crops, title=title, note=note)
     if as_json:
         emit_json(comparison.as_json() | ({"report": str(output)} if output else {}) | {"exceeded": beyond})
     else:
@@ -279,12 +305,37 @@ def load_reference(reference: str | None, select: options.Select) -> Path | Pipe
     return _set_by("--reference", selection.sets, selection)
 
 
-def check_page(output: Path) -> None:
+def _write(comparison: Comparison, output: Path, crops: Sequence[Any], *, title: str, note: str) -> None:
+    """Write a comparison as the extension says: as a page, a figure or a table."""
+    suffix = output.suffix.lower()
+    if suffix in _FIGURES:
+        from rendergraph.compare.report.figure import save_figure
+
+        save_figure(comparison, output, crops, note or title)
+        return
+    if suffix == ".tex":
+        from rendergraph.compare.report.figure import latex_table
+
+        text = latex_table(*summary(comparison.results))
+    elif suffix == ".csv":
+        from rendergraph.compare.export.table import csv_text
+
+        text = csv_text(comparison)
+    else:
+        from rendergraph.compare.report import comparison_page
+
+        text = comparison_page(comparison, options.command_line(), title=title, note=note)
+    options.write(text, output)
+
+
+def check_page(output: Path, endings: Sequence[str] = (".html", ".htm")) -> None:
     """Check, before anything is rendered, that a report can be written."""
     from rendergraph.images import check_target
 
-    if output.suffix.lower() not in (".html", ".htm"):
-        raise UsageError(Problem("RG501", f"a report is an HTML page; name it '{output.with_suffix('.html')}'"))
+    if output.suffix.lower() not in endings:
+        more = "; figures end in .pdf, .svg or .png, tables in .tex or .csv" if ".tex" in endings else ""
+        text = f"a report is an HTML page; name it '{output.with_suffix('.html')}'{more}"
+        raise UsageError(Problem("RG501", text))
     check_target(output)
 
 

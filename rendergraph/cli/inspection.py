@@ -212,24 +212,24 @@ def diff(a: str, b: str, select: options.Select, svg: Path | None, as_json: bool
       rendergraph diff forward my.yaml --svg difference.svg
       rendergraph diff forward forward-prepass --json
     """
-    from rendergraph import diff
+    from rendergraph.diff import diff, diff_json, diff_svg, diff_text, figures
     from rendergraph.session import stages
 
     old, new = (options.sketch(select(name)) for name in (a, b))
-    difference = diff.diff(old.graph, new.graph)
+    difference = diff(old.graph, new.graph)
     missing = [problem.as_json() for problem in (*old.missing, *new.missing)]
     plans = None
     if not missing:
-        was, now = (diff.figures(stages.plan(stages.expand(linked)).plan) for linked in (old, new))
+        was, now = (figures(stages.plan(stages.expand(linked)).plan) for linked in (old, new))
         plans = was, now
     written: dict[str, Any] = {}
     if svg is not None:
-        options.write(diff.diff_svg(old.graph, new.graph, difference), svg)
+        options.write(diff_svg(old.graph, new.graph, difference), svg)
         written["svg"] = str(svg)
     if as_json:
-        emit_json(diff.diff_json(difference, plans) | written | {"missing": missing})
+        emit_json(diff_json(difference, plans) | written | {"missing": missing})
     else:
-        emit(written["svg"] if written else diff.diff_text(difference, plans).rstrip("\n"))
+        emit(written["svg"] if written else diff_text(difference, plans).rstrip("\n"))
     options.exit_if_missing(old, new)
 
 

@@ -5,9 +5,10 @@ from rendergraph.compare import compare, sweep
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING
 
-from rendergraph.lazy import lazy_exports
+from rendergraph.lazy import CallableModule, lazy_exports
 
 if TYPE_CHECKING:
     from rendergraph.compare.engine import Sweep, compare, compare_pictures, sweep
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from rendergraph.compare.space import Axis, Space
 
 
+sys.modules[__name__].__class__ = CallableModule
 __getattr__, __dir__ = lazy_exports(
     __name__,
     {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -21,7 +22,7 @@ from rendergraph.compare.prepare import (
     read_picture,
     seen,
 )
-from rendergraph.compare.results import Comparison, Reference, Result, Search, measure_against, pareto
+from rendergraph.compare.results import Comparison, Reference, Result, Results, Search, measure_against, pareto
 from rendergraph.compare.runner import Runner, SweepRunner
 from rendergraph.compare.space import Axes, Space, run_name, typed, unique_names
 from rendergraph.compare.store import RUN, Failure, SweepFolder, locked
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
+class Sweep(Results):
     """The results of a sweep.
 
     Attributes:
@@ -60,7 +61,7 @@ class Sweep:
     timed: int
     redrawn: int
     torn: int
-    failures: tuple[Failure, ...]
+    failures: tuple[Failure, ...] = ()
     search: Search | None = None
 
     def __repr__(self) -> str:
@@ -68,6 +69,16 @@ class Sweep:
 
     def _repr_html_(self) -> str:
         return self.comparison._repr_html_()
+
+    @property
+    def results(self) -> tuple[Result, ...]:  # type: ignore[override]  # which never changes there either
+        """One for each run, in the order of the product."""
+        return self.comparison.results
+
+    @property
+    def whole(self) -> Comparison:
+        """The comparison of all runs."""
+        return self.comparison
 
     def as_json(self) -> dict[str, Any]:
         document = self.comparison.as_json()
@@ -93,6 +104,7 @@ def compare(
     options: SweepOptions = SweepOptions(frames=10),
     *,
     names: Sequence[str] = (),
+    size: tuple[int, int] | None = None,
     **settings: Unpack[SweepKeywords],
 ) -> Comparison:
     """Render pipelines with one scene, one camera and at one size, and compare the pictures.
@@ -103,6 +115,7 @@ def compare(
             the outputs `radiance` and `variance` is a truth: it is drawn until its noise is small.
         options: how to render and measure; in this process, the default, the pipelines take turns.
         names: of the pipelines; those of their files by default.
+        size: width and height of the pictures; those of the first pipeline by default.
         settings: attributes of `SweepOptions` by name: `frames=20, metric="ao.occlusion"`.
 
     Raises:
@@ -113,11 +126,11 @@ def compare(
     """
     options = options.replace(**settings)
     options = options.replace(executor=options.executor or "serial")
-    if isinstance(pipelines, (Pipeline, str, Path)):
+    if isinstance(pipelines, (Pipeline, str, Path, Mapping)):
         pipelines = [pipelines]
     if not pipelines:
         raise UsageError(Problem("RG500", "there is no pipeline to compare"))
-    given, reference = [as_pipeline(each) for each in pipelines], named_reference(reference)
+    given, reference = [as_pipeline(each).with_size(size) for each in pipelines], named_reference(reference)
     with track_reads() as files:
         if isinstance(reference, Pipeline):
             reference = measured_at(reference, options.metric)
@@ -138,11 +151,13 @@ def compare(
 
 
 def sweep(
-    base: Pipeline | str | Path,
+    base: Pipeline | str | Path | Mapping[str, Any],
     axes: Axes,
-    out: Path | str,
+    out: Path | str | None = None,
     reference: Path | Pipeline | str | None = None,
     options: SweepOptions = SweepOptions(),
+    *,
+    size: tuple[int, int] | None = None,
     **settings: Unpack[SweepKeywords],
 ) -> Sweep:
     """Render every combination of the axes' values into a folder each, and measure it.
@@ -154,9 +169,11 @@ def sweep(
         base: the pipeline that the axes change, also by its name or file.
         axes: paths with values or ranges: `{"ao.samples": [8, 16], "ao.radius": "log:0.1:1:5"}`; or a `Space`, for
             samples and zipped axes.
-        out: the folder; `results.jsonl` in it gets a line for each measured run.
+        out: the folder; `results.jsonl` in it gets a line for each measured run. Without one, results are kept in
+            memory alone.
         reference: a picture or a pipeline that runs are measured against, also by its name; the first run by default.
         options: how to render and measure.
+        size: width and height of the pictures; those of the pipeline by default.
         settings: attributes of `SweepOptions` by name: `frames=20, resume=True`.
 
     Raises:
@@ -166,7 +183,15 @@ def sweep(
         DeviceError: there is no usable GL device.
     """
     options = options.replace(**settings)
-    base, out, reference, space = as_pipeline(base), Path(out), named_reference(reference), Space.of(axes)
+    if out is None:
+        with tempfile.TemporaryDirectory(prefix="rendergraph-") as folder:
+            return sweep(base, axes, folder, reference, options, size=size)
+    base, out, reference, space = (
+        as_pipeline(base).with_size(size),
+        Path(out),
+        named_reference(reference),
+        Space.of(axes),
+    )
     space.check()
     if len(views := by_view(space, reference, options.only)) > 1:
         return _sweep_of_views(base, views, out, reference, options, space)
@@ -174,8 +199,8 @@ def sweep(
         prepared = prepare(base, space, out, reference, options)
     runs = prepared.runs
     with locked(out):
-        folder = SweepFolder.open(out, prepared.study, resume=options.resume)
-        runner = SweepRunner(prepared, options, folder)
+        store = SweepFolder.open(out, prepared.study, resume=options.resume)
+        runner = SweepRunner(prepared, options, store)
         missing = runner.missing
         resumed, timed = len(runs) - len(missing), sum(number in runner.results for number in missing)
         redrawn = sum((runs[n].folder / RUN).exists() for n in missing if n not in runner.results)
@@ -185,7 +210,7 @@ def sweep(
                 report_progress(options.progress, "runs") as report,
             ):
                 farm.upload_inputs(lambda: make_bundle(files, base.selection.plugins, prepared.modules))
-                folder.begin(prepared.study)
+                store.begin(prepared.study)
                 runner.execute(farm, report)
     if runner.reference is None:  # all runs are complete, and the first one is what they are measured against
         pixels = runner.results[0].pixels
@@ -201,7 +226,7 @@ def sweep(
         resumed=resumed,
         timed=timed,
         redrawn=redrawn,
-        torn=folder.incomplete,
+        torn=store.incomplete,
         failures=failures,
     )
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import platform
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -20,8 +21,8 @@ from rendergraph.compare.timing import NO_TIMES, Times
 from rendergraph.declare import Added
 from rendergraph.declare.extensions import Metric
 from rendergraph.diff import GraphDiff, diff_json
-from rendergraph.errors import Place, Problem
-from rendergraph.installed import versions
+from rendergraph.errors import Place, Problem, suggestion
+from rendergraph.installed import require, versions
 from rendergraph.metrics import Encoding, Metrics
 from rendergraph.session.frame import not_finite
 
@@ -245,8 +246,62 @@ class Result:
         return document
 
 
+class Results(ABC):
+    """Results in order: iterate them, take one by its name or number, or take all as a table.
+
+    The table has the columns of a sweep's `results.csv`.
+    """
+
+    results: tuple[Result, ...]
+    failures: tuple[Any, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.results)
+
+    def __iter__(self) -> Iterator[Result]:
+        return iter(self.results)
+
+    def __getitem__(self, name: str | int) -> Result:
+        if isinstance(name, int):
+            return self.results[name]
+        found = next((result for result in self.results if result.name == name), None)
+        if found is None:
+            names = [result.name for result in self.results]
+            raise KeyError(f"there is no result '{name}'{suggestion(name, names)}")
+        return found
+
+    def to_dict(self) -> dict[str, list[Any]]:
+        """Return the table as lists by column; None is an unknown value."""
+        # By its name: tables are made of results, and nothing else here knows of them.
+        rows = import_module("rendergraph.compare.export.table").rows_of(self.results, self.failures)
+        names = dict.fromkeys(name for row in rows for name in row)
+        return {name: [row.get(name) for row in rows] for name in names}
+
+    def to_pandas(self) -> Any:
+        """Return the table as a DataFrame of pandas, which must be installed; the index has the names of the runs."""
+        require("to_pandas()", "figures", "pandas")
+        return import_module("pandas").DataFrame(self.to_dict()).set_index("run")
+
+    def figure(self, crops: Any = (), *, caption: str = "", errors: bool = False, width: float = 7.0) -> Any:
+        """Return a figure of Matplotlib with the pictures, magnified crops and errors; see `report.figure.figure`.
+
+        Args:
+            crops: parts of the picture: left, top, width and height in pixels, also by name.
+            caption: text beneath.
+            errors: whether a row of FLIP maps follows the pictures.
+            width: of the figure, in inches.
+        """
+        make = import_module("rendergraph.compare.report.figure").figure
+        return make(self.whole, crops, caption=caption, errors=errors, width=width)
+
+    @property
+    @abstractmethod
+    def whole(self) -> Comparison:
+        """The comparison that the results belong to."""
+
+
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Results):
     """Variants against a reference, with one scene, at one size, on one machine.
 
     Attributes:
@@ -281,6 +336,11 @@ class Comparison:
         # By its name, for notebooks alone: reports are made from results, and nothing else here knows of them.
         html: str = import_module("rendergraph.compare.report").notebook_html(self)
         return html
+
+    @property
+    def whole(self) -> Comparison:
+        """Itself."""
+        return self
 
     @property
     def software(self) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct
@@ -83,6 +84,10 @@ class GraphDiff(Struct, frozen=True):
     outputs: tuple[OutputChange, ...] = ()
     sizes: tuple[tuple[int, int], tuple[int, int]] | None = None
 
+    def __str__(self) -> str:
+        # By its name: texts are made of differences, and nothing else here knows of them.
+        return str(import_module("rendergraph.diff.show").diff_text(self)).rstrip("\n")
+
     def __bool__(self) -> bool:
         changes = (self.added, self.removed, self.renamed, self.retyped, self.links, self.parameters, self.outputs)
         return any(changes) or self.sizes is not None
@@ -101,8 +106,12 @@ class GraphDiff(Struct, frozen=True):
         return notes
 
 
-def diff(a: Graph, b: Graph) -> GraphDiff:
-    """Return what turns `a` into `b`; both are resolved and linked, so only their meaning is compared."""
+def diff(a: Any, b: Any) -> GraphDiff:
+    """Return what turns `a` into `b`: graphs, or pipelines, also by their names, files or content.
+
+    Both are resolved and linked, so only their meaning is compared. Printed, it is what `rendergraph diff` prints.
+    """
+    a, b = _graph(a), _graph(b)
     nodes = _matched(a, b)
     matched = set(nodes.values())
     added = tuple(node.id for node in b.nodes if node.id not in matched)
@@ -250,3 +259,11 @@ def figures(plan: ResourcePlan) -> PlanFigures:
         peak_bytes=schedule.peak_bytes,
         peak_node=schedule.peak_node,
     )
+
+
+def _graph(given: Any) -> Graph:
+    if isinstance(given, Graph):
+        return given
+    # By its name, for callers in Python: pipelines are made of graphs.
+    found: Graph = import_module("rendergraph.session.pipeline").as_pipeline(given).link().graph
+    return found

@@ -20,4 +20,5 @@ from rendergraph.images.saving import (
     stands_for,
     viewable_as,
 )
+from rendergraph.images.shown import Shown, shown
 from rendergraph.images.viewable import from_srgb, heat_map, signed_map, to_srgb, viewable

@@ -15,6 +15,7 @@ from rendergraph.errors import InputError, Place, Problem, suggestion
 
 if TYPE_CHECKING:
     from rendergraph.execute import FrameTimes
+    from rendergraph.images import Shown
 
 
 class OutputInfo(Struct, frozen=True):
@@ -214,6 +215,28 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
             raise InputError(Problem("RG205", f"no output '{chosen}' to write{suggestion(chosen, self.arrays)}"))
         save_output(path, self.arrays[chosen], self.infos[chosen], self.metadata)
         return path
+
+    def show(
+        self,
+        name: str,
+        *,
+        layer: int | None = None,
+        channel: int | None = None,
+        low: float | None = None,
+        high: float | None = None,
+    ) -> Shown:
+        """Return a picture of a texture, which shows itself in a notebook: values in false colours, with their scale.
+
+        Args:
+            name: of an output or a tap: `render(taps=["sun.shadow_map"]).show("sun.shadow_map", layer=0)`.
+            layer, channel: the part of the texture, where it has several.
+            low, high: the values of the darkest and brightest colour; the least and the greatest by default.
+        """
+        from rendergraph.images import shown
+
+        array, info = self[name], self.infos[name]
+        part = {"layer": layer, "channel": channel, "low": low, "high": high}
+        return shown(array, name, info.semantic, info.encoding, **part)  # type: ignore[arg-type]
 
     def _repr_png_(self) -> bytes:
         from rendergraph.images import Saved, encoded, output_for

@@ -188,9 +188,9 @@ class Pipeline:
         )
         return replace(self, selection=selection, catalog=catalog), plain
 
-    def with_size(self, size: tuple[int, int]) -> Pipeline:
-        """Return a copy with another size."""
-        return self if self.selection.size == size else self.select(size=size)
+    def with_size(self, size: tuple[int, int] | None) -> Pipeline:
+        """Return a copy with another size, if one is given."""
+        return self if size in (None, self.selection.size) else self.select(size=size)
 
     def select(self, **fields: Any) -> Pipeline:
         """Return a copy with other values of these fields of its selection."""
@@ -249,7 +249,7 @@ class Pipeline:
         """
         from rendergraph.session.gpu import shared
 
-        expanded = (self if size is None else self.with_size(size)).expand(**options)
+        expanded = self.with_size(size).expand(**options)
         with report_progress(progress, "frames") as tell:
             return stages.draw_last(expanded, session or shared(device), tell)
 
@@ -264,7 +264,7 @@ class Pipeline:
         """Render frame by frame, as `render`; each frame is yielded before the next one is rendered."""
         from rendergraph.session.gpu import opened
 
-        expanded = (self if size is None else self.with_size(size)).expand(**options)
+        expanded = self.with_size(size).expand(**options)
 
         def rendered() -> Iterator[Frame]:
             with opened(session, device) as gpu:

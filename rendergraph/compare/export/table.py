@@ -5,12 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from rendergraph.compare.engine import Sweep
-from rendergraph.compare.results import Result, pareto, typed_settings
+from rendergraph.compare.results import Result, Results, pareto, typed_settings
+from rendergraph.compare.store import Failure
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ COLUMNS = (
     Column("repeats_min_ms", "number", "Least median of several measurements.", _spread("repeated", "min"), "ms"),
     Column("repeats_max_ms", "number", "Greatest median of several measurements.", _spread("repeated", "max"), "ms"),
     Column("passes", "integer", "Number of passes.", lambda r: r.pass_count),
-    Column("allocated_bytes", "integer", "Memory of textures.", lambda r: r.allocated_bytes, "B"),
+    Column("allocated_bytes", "integer", "Memory of textures.", lambda r: r.allocated_bytes if r.memory else None, "B"),
     Column("not_finite", "integer", "Pixels that are NaN or infinite.", lambda r: r.not_finite),
 )
 """Between the settings and the last two columns; plugin metrics and figures follow behind those."""
@@ -60,18 +60,23 @@ ERROR = Column("error", "string", "Why it could not be rendered; empty where it 
 _TAKEN = frozenset(column.name for column in (RUN, *COLUMNS, PARETO, ERROR))
 
 
-def csv_text(sweep: Sweep) -> str:
-    """Return the table with a row for each run, under names; unknown values are empty, lists are JSON."""
-    results = sweep.comparison.results
+def rows_of(results: Sequence[Result], failures: Sequence[Failure] = ()) -> list[dict[str, Any]]:
+    """Return the table: a row for each run, by the names of its columns."""
     front = {result.name for result in pareto(results)}
     rows = []
     for result in results:
         row = {column.name: column.value(result) for column in COLUMNS}
         row |= {PARETO.name: result.name in front, ERROR.name: None, **_prefixed("figures", result.columns)}
         rows.append({RUN.name: result.name, **_prefixed("settings", typed_settings(result.settings)), **row})
-    for failure in sweep.failures:
+    for failure in failures:
         settings = _prefixed("settings", typed_settings(failure.settings))
         rows.append({RUN.name: failure.name, **settings, PARETO.name: False, ERROR.name: failure.text})
+    return rows
+
+
+def csv_text(sweep: Results) -> str:
+    """Return the table with a row for each run, under names; unknown values are empty, lists are JSON."""
+    rows = rows_of(sweep.results, sweep.failures)
     names = list(dict.fromkeys(name for row in rows for name in row))
     text = io.StringIO()
     writer = csv.DictWriter(text, names, lineterminator="\n")
