@@ -133,7 +133,7 @@ def test_nan_is_magenta_in_a_png_and_its_first_texture_is_named(cli: Any, tmp_pa
         ),
         (("compare", "forward", "forward", "--fail-above", "psnr=30"), 2, "psnr falls as errors grow"),
         (("compare", "forward", "forward", "--fail-above", "flip=x"), 2, "is not METRIC=NUMBER, as in flip=0.02"),
-        (("compare", "forward", "forward", "-o", "page.pdf"), 2, "name it 'page.html'"),
+        (("compare", "forward", "forward", "-o", "page.txt"), 2, "name it 'page.html'"),
         (("compare", "forward", "forward", "-o", "none/page.html"), 3, "there is no folder 'none'"),
         (("compare", "forward", "--reference", "missing.png"), 3, "RG350"),
         (

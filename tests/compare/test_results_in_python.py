@@ -84,7 +84,10 @@ def test_compare_writes_figures_and_tables(tmp_path: Path) -> None:
     assert "light.shading=phong" in tex
     assert r"$\infty$" in tex
     assert r"10--90 \%" in tex or "GPU ms" not in tex
-    assert [row["run"] for row in csv.DictReader((tmp_path / names[2]).read_text().splitlines())] == ["forward", "light.shading=phong"]
+    assert [row["run"] for row in csv.DictReader((tmp_path / names[2]).read_text().splitlines())] == [
+        "forward",
+        "light.shading=phong",
+    ]
 
 
 def test_a_missing_library_is_named_with_its_extra() -> None:
