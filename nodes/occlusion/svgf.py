@@ -20,6 +20,7 @@ from rendergraph.api import (
     param,
     structural,
 )
+from rendergraph.api import Any as AnyTexel
 
 
 class SVGF(Node):
@@ -44,11 +45,14 @@ class SVGF(Node):
     depth = Input(Depth, doc="Window depth; positions come from it and its view.")
     normal = Input(Normal, doc="Unit normal, world space.")
     velocity = Input(Velocity, optional=True, doc="Motion vectors. Unconnected: only the camera moves.")
+    instance = Input(
+        AnyTexel, optional=True, doc="Number of the object in each pixel. Objects in one plane then keep apart."
+    )
     denoised = Output(Radiance, format="rgba16f", size="radiance", doc="The smooth picture; the source for background.")
     variance = Output(
         Luminance, format="r32f", size="radiance", doc="Variance of the luminance over albedo before the filter."
     )
-    mean = History(format="rgba32f", doc="Mean light over albedo, and the number of samples in the source.")
+    mean = History(format="rgba32f", doc="Mean light over albedo, and the number of the object.")
     moments = History(format="rg32f", doc="Means of its luminance and of the square.")
     surfaces = History(format="rgba32f", doc="Normal times the number of frames; distance.")
     source = History(format="rgba32f", doc="The source, and its number of samples.")
@@ -71,11 +75,7 @@ class SVGF(Node):
 
     def record(self, steps: Steps) -> None:
         """Record the temporal mean, the variance and the filter."""
-        reads: dict[str, Any] = {
-            port.name: port
-            for port in (self.radiance, self.samples_taken, self.albedo, self.depth, self.normal, self.velocity)
-            if steps.connected(port)
-        }
+        reads: dict[str, Any] = {port.name: port for port in self.inputs().values() if steps.connected(port)}
         before: dict[str, Any] = {
             f"previous_{port.name}": port.previous for port in (self.mean, self.moments, self.surfaces, self.source)
         }

@@ -81,6 +81,9 @@ class PathTraced(Node):
     albedo = Output(Albedo, format="rgba16f", clear=0.0, doc="Base colour of the first surface at the pixel's centre.")
     normal = Output(Normal, format="rgba16_snorm", clear=0.0, doc="Its shading normal; 0 on the background.")
     depth = Output(Depth, format="depth32f", clear=0.0, doc="Its window depth, 0 on the background.")
+    instance = Output(
+        AnyTexel, format="r32f", clear=0.0, doc="Number of its object in the scene, from 1; 0 on the background."
+    )
     mean = History(format="rgba32f")
     spread = History(format="rgba32f")
     mean_between = Internal(format="rgba32f", doc="The mean between two steps of a frame.")
@@ -166,7 +169,7 @@ class PathTraced(Node):
         means = {name: port for name, port in used.items() if name in ("radiance", "variance", "samples_taken")}
         if means:
             self._trace_paths(steps, means)
-        first = {name: port for name, port in used.items() if name in ("albedo", "normal", "depth")}
+        first = {name: port for name, port in used.items() if name in ("albedo", "normal", "depth", "instance")}
         if first:
             first.setdefault("depth", self.first_depth)
             steps.draw(

@@ -1,5 +1,6 @@
 // Where the surface of a pixel was in the previous frame, and which texels there showed the same surface: in the same
-// plane, with a similar normal.
+// plane, with a similar normal. A shader that knows the objects defines IS_SAME_OBJECT(texel) before, for texels of the
+// previous frame.
 #include "surfaces.glsl"
 #include <frame.glsl>
 #include <velocity.glsl>
@@ -25,6 +26,9 @@ struct Reprojection {
 float history_length(ivec2 texel, vec3 position, vec3 surface_normal) {
     ivec2 size = textureSize(previous_surfaces, 0);
     if (texel != clamp(texel, ivec2(0), size - 1)) return 0.0;
+#ifdef IS_SAME_OBJECT
+    if (!IS_SAME_OBJECT(texel)) return 0.0;
+#endif
     vec4 previous = texelFetch(previous_surfaces, texel, 0);
     float count = length(previous.xyz);
     if (count < 0.5 || dot(previous.xyz, surface_normal) < facing * count) return 0.0;

@@ -1,5 +1,14 @@
 // The temporal half of SVGF: light over albedo and the moments of its luminance, as means over frames (C. Schied et
 // al., "Spatiotemporal Variance-Guided Filtering", 2017).
+uniform sampler2D previous_mean;
+#ifdef HAS_INSTANCE
+uniform sampler2D instance;
+#define IS_SAME_OBJECT(texel) (texelFetch(previous_mean, texel, 0).w == current_object())
+
+float current_object() {
+    return texelFetch(instance, ivec2(gl_FragCoord.xy), 0).r;
+}
+#endif
 #include "reprojection.glsl"
 #include "svgf_albedo.glsl"
 #include <luminance.glsl>
@@ -8,7 +17,6 @@ uniform sampler2D albedo;
 #ifdef HAS_SAMPLES_TAKEN
 uniform sampler2D samples_taken;
 #endif
-uniform sampler2D previous_mean;
 uniform sampler2D previous_moments;
 uniform sampler2D previous_source;
 out vec4 mean;
@@ -55,5 +63,8 @@ void main() {
         mean = mix(mean_sum / r.total_weight, mean, 1.0 / count);
         moments = mix(moments_sum / r.total_weight, moments, 1.0 / count);
     }
+#ifdef HAS_INSTANCE
+    mean.w = current_object();
+#endif
     surfaces = surface_with_count(surface_normal, count, window_depth);
 }

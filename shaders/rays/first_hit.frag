@@ -7,6 +7,9 @@ out vec4 albedo;
 #ifdef WRITES_NORMAL
 out vec4 normal;
 #endif
+#ifdef WRITES_INSTANCE
+out float instance;
+#endif
 
 void main() {
     View view = PASS_VIEW;
@@ -19,6 +22,9 @@ void main() {
 #endif
 #ifdef WRITES_NORMAL
     normal = is_hit ? vec4(s.normal, 0.0) : vec4(0.0);
+#endif
+#ifdef WRITES_INSTANCE
+    instance = is_hit ? float(hit.instance + 1) : 0.0;
 #endif
     vec4 clip = view.view_projection * vec4(ray.origin + hit.distance * ray.direction, 1.0);
     gl_FragDepth = is_hit ? clip.z / clip.w : 0.0;

@@ -35,7 +35,7 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
-def frames(session: rg.Session, room: Path, count: int, *sets: str) -> list[dict[str, Floats]]:
+def frames(session: rg.Session, room: Path, count: int, *sets: str, still: int | None = 1) -> list[dict[str, Floats]]:
     """The smooth and the raw picture of each frame, RGB, and the variance before the filter."""
     ports = {"smooth": "filter.denoised", "raw": "light.radiance", "variance": "filter.variance"}
     patch = {"outputs": {"image": None, "radiance": None, **ports}}
@@ -46,7 +46,7 @@ def frames(session: rg.Session, room: Path, count: int, *sets: str) -> list[dict
         sets=("light.ambient=0.4", "light.max_bounces=1", "light.environment=null", *sets),
         patches=[patch],
     )
-    shown = session.frames(pipeline, frames=range(1, count + 1), outputs=tuple(ports), warm_up=False, still=True)
+    shown = session.frames(pipeline, frames=range(1, count + 1), outputs=tuple(ports), warm_up=False, still=still)
     return [{name: np.asarray(frame[name], np.float64)[..., :3] for name in ports} for frame in shown]
 
 
@@ -102,3 +102,23 @@ def test_the_variance_falls_with_the_number_of_frames(still: Sequence[dict[str, 
     floor = slice(16, 24)  # grey, so luminance over albedo is twice the value
     found = (((still[15]["raw"] - truth)[floor, :, 0] / albedo[0]) ** 2).mean()
     assert still[15]["variance"][floor, :, 0].mean() == pytest.approx(found, rel=0.35)
+
+
+def test_a_plate_that_glows_leaves_no_trail_on_the_floor_in_its_plane(session: rg.Session, room: Path) -> None:
+    """The floor that it uncovers begins anew, and the plate goes on; without the objects' numbers it is smeared."""
+    moving = room.with_name("moving.yaml")
+    plate = "  plate: {shape: box, size: [1, 0.01, 1], material: lamp}\n"
+    lamp = "  lamp: {base_color: [0.5, 0.5, 0.5], roughness: 1, emissive: [2, 2, 2]}\n"
+    keys = "keyframes: {objects.plate.at: {0: [-2, 0.006, 0.5], 1: [4, 0.006, 0.5]}}\n"
+    text = ROOM.replace("  ball:", f"{plate}  ball:").replace("lights:", f"{lamp}lights:")
+    moving.write_text(text.replace("cameras:", f"{keys}cameras:"))
+    pictures = {}
+    for instance in ("light.instance", "null"):
+        *_, before, last = frames(session, moving, 8, "filter.luminance_tolerance=0", f"filter.instance={instance}", still=None)
+        pictures[instance] = last["smooth"]
+        left = (before["raw"][..., 0] > 2) & (last["raw"][..., 0] < 2)  # what the plate has just uncovered
+    assert left.sum() > 5
+    floor, stays = last["raw"], (before["raw"][..., 0] > 2) & (last["raw"][..., 0] > 2)
+    np.testing.assert_allclose(pictures["light.instance"][left], floor[left], rtol=0.03, atol=2e-3)
+    assert pictures["null"][left].mean() > 1.6 * floor[left].mean()
+    assert np.abs(pictures["light.instance"] - floor)[stays].max() > 0.01  # it is a mean, not the last frame
