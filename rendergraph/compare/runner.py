@@ -43,7 +43,7 @@ from rendergraph.compare.tasks import (
     TimingResult,
     VariantTask,
 )
-from rendergraph.compare.truth import TruthTask, TwinResult, TwinTask, noise_note, representatives
+from rendergraph.compare.truth import TruthProgress, TruthTask, TwinResult, TwinTask, noise_note, representatives
 from rendergraph.errors import Problem, RendergraphError
 from rendergraph.farm import Executor, Handle, TaskFailed, TaskFinished, TaskOutput, TaskRetried
 from rendergraph.session.progress import report_progress
@@ -107,14 +107,16 @@ class Runner:
                 limits=self.options.limits,
             )
         )
-        with report_progress(self.options.progress is True, "% of the reference") as tell:
+        at: TruthProgress | None = None
+        with report_progress(self.options.progress is True, lambda: f"% of {truth.name}, {at}") as tell:
             for event in farm.events():
                 if not isinstance(event, TaskOutput):
                     self._task_event(farm, event)
                 elif isinstance(event.value, ReferenceResult):
                     found, self.device = event.value.reference, event.value.origin["device"]
                 else:
-                    tell(round(100 * event.value), 100)
+                    at = event.value
+                    tell(round(100 * at.part), 100)
         assert found is not None  # a task that fails raises
         return found
 

@@ -17,7 +17,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -48,6 +48,18 @@ _MOST_LIGHTS = 512 << 20
 """Bytes of the light of runs that are drawn beforehand, to know the smallest error."""
 
 
+class TruthProgress(NamedTuple):
+    """The completed part of a truth, 0…1, the samples of a pixel, and how much larger its noise is than wanted."""
+
+    part: float
+    samples: int
+    excess: float | None = None
+
+    def __str__(self) -> str:
+        noise = f", noise {self.excess:.2g} × that wanted" if self.excess is not None else ""
+        return f"{self.samples} samples{noise}"
+
+
 @dataclass(frozen=True, eq=False)
 class Truth:
     """The light, (height, width, 3), the variance of each of its values, the samples of a pixel, and the time taken."""
@@ -70,7 +82,7 @@ class Truth:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TruthTask(Task):
-    """Draw the truth: yields the completed part, 0…1, now and then, and at last the reference.
+    """Draw the truth: yields its progress now and then, and at last the reference.
 
     Attributes:
         key: what decides the truth, besides the number of samples.
@@ -86,7 +98,7 @@ class TruthTask(Task):
     encoding: Encoding
     limits: TruthLimits
 
-    def run(self, worker: Worker) -> Iterator[float | ReferenceResult]:
+    def run(self, worker: Worker) -> Iterator[TruthProgress | ReferenceResult]:
         planned, frame = self.truth.plan(worker), self.truth.frame
         lights = [_light(worker.gpu, run.plan(worker), run) for run in self.runs]
         stored = _load(self.key)
@@ -146,8 +158,8 @@ def representatives(runs: Sequence[Run]) -> tuple[Run, ...]:
 
 def draw_truth(
     gpu: Gpu, planned: Planned, frame: int, lights: Sequence[Pixels], limits: TruthLimits
-) -> Iterator[float | Truth]:
-    """Draw a truth of the scene at a frame's time; yield the completed part now and then, and at last the truth.
+) -> Iterator[TruthProgress | Truth]:
+    """Draw a truth of the scene at a frame's time; yield its progress after each frame, and at last the truth.
 
     Args:
         gpu: where to draw; nothing else may be drawn there meanwhile.
@@ -162,13 +174,15 @@ def draw_truth(
     with gpu.current():
         drawing = stages.compile(stages.expand(planned.linked, options), gpu)
         drawing.begin(lead=0)
-    due, share = 1, 0.0
+    due, share, excess, samples = 1, 0.0, None, 0
+    yield TruthProgress(0.0, 0)
     for drawn in itertools.count(1):
         with gpu.current():
             drawing.draw(frame + drawn - 1)
         seconds = time.monotonic() - begun
         if drawn < due and seconds < limits.seconds:
-            yield min(1.0, max(share * drawn / due, seconds / limits.seconds))
+            part = max(share * drawn / due, seconds / limits.seconds)
+            yield TruthProgress(min(1.0, part), samples * drawn, excess)
             continue
         with gpu.current():
             truth = _truth(drawing.read().arrays, drawn, seconds)
@@ -177,11 +191,14 @@ def draw_truth(
         wanted = limits.noise * _smallest_error(truth, lights)
         if drawn >= _LEAST_FRAMES and truth.noise <= wanted:
             break
+        samples = truth.samples // drawn  # of each frame
         left = truth.noise / wanted if wanted > 0 else math.inf  # noise falls as the number of samples grows
+        excess = left if math.isfinite(left) else None
         left = min(2.0, left, limits.most_samples / max(1, truth.samples))
         due = max(drawn + 1, math.ceil(drawn * left))
         share = min(1.0, max(wanted / truth.noise if truth.noise > 0 else 0.0, truth.samples / limits.most_samples))
         share = min(1.0, share * due / drawn)
+        yield TruthProgress(min(1.0, max(share * drawn / due, seconds / limits.seconds)), truth.samples, excess)
     yield truth
 
 
@@ -268,5 +285,6 @@ def noise_note(reference: Reference, smallest: float | None, limits: TruthLimits
     part = (
         f"{100 * noise / smallest:.0f} % of the smallest error" if smallest > 0 else "not below the smallest error, 0"
     )
-    more = "--reference-seconds or --reference-samples draws more"
-    return f"the noise of '{reference.name}' after {reference.samples} samples is {part}; a larger {more}"
+    ended = "samples" if limits.samples and (reference.samples or 0) >= limits.samples else "seconds"
+    ended = f"--reference-{ended} {getattr(limits, ended):g}"
+    return f"the noise of '{reference.name}' after {reference.samples} samples is {part}: {ended} ended it"

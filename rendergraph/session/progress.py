@@ -15,12 +15,12 @@ _WIDTH = 30
 
 
 @contextmanager
-def report_progress(progress: Progress | bool | None, word: str) -> Iterator[Progress]:
+def report_progress(progress: Progress | bool | None, word: str | Callable[[], str]) -> Iterator[Progress]:
     """Yield the function to call: the one that was given, one that shows a bar for `True`, else one that does nothing.
 
     Args:
         progress: as the caller passed it.
-        word: the unit of the numbers: `frames`.
+        word: the unit of the numbers: `frames`; or what returns it, with whatever else is to be said.
     """
     if not isinstance(progress, bool):
         yield progress or _ignore
@@ -36,9 +36,9 @@ def report_progress(progress: Progress | bool | None, word: str) -> Iterator[Pro
 
 
 class Bar:
-    """A bar on stderr with the speed and the remaining time; `word` is the unit of the numbers."""
+    """A bar on stderr with the speed and the remaining time; `word` is the unit of the numbers, or returns it."""
 
-    def __init__(self, word: str, *, shown: bool = True) -> None:
+    def __init__(self, word: str | Callable[[], str], *, shown: bool = True) -> None:
         self._shown = shown and sys.stderr is not None
         self._word, self._longest, self._begun, self._before = word, 0, time.monotonic(), -1
 
@@ -49,11 +49,11 @@ class Bar:
         if self._before < 0:  # what was there already took no time
             self._begun, self._before = time.monotonic(), done
         full = _WIDTH * done // max(1, total)
-        text = f"{'█' * full}{'·' * (_WIDTH - full)} {done} of {total} {self._word}"
+        text = f"{'█' * full}{'·' * (_WIDTH - full)} {done} of {total} {self._word() if callable(self._word) else self._word}"
         text += _pace(done - self._before, total - done, time.monotonic() - self._begun)
         self._longest = max(self._longest, len(text))
         encoding = getattr(sys.stderr, "encoding", None) or "utf-8"
-        self._print(text.encode(encoding, "replace").decode(encoding))
+        self._print(text.ljust(self._longest).encode(encoding, "replace").decode(encoding))
 
     def clear(self) -> None:
         """Take the bar away, before something else is printed."""

@@ -317,10 +317,18 @@ def test_twins_that_do_not_fit_are_said_and_leave_the_others(make: Maker, gl: rg
     assert any("'shadows' of 'approximate' cannot be replaced by its twin 'show'" in note for note in found.notes)
 
 
-def test_limits_end_the_drawing_and_the_remaining_noise_is_said(make: Maker, gl: rg.Session) -> None:
-    found = compare(make.approximate(), make.truth(), frames=1, session=gl, reference_noise=1e-9, reference_samples=100)
+def test_limits_end_the_drawing_and_the_remaining_noise_is_said(
+    make: Maker, gl: rg.Session, capsys: pytest.CaptureFixture[str]
+) -> None:
+    limits: Any = {"reference_noise": 1e-9, "reference_samples": 100}
+    found = compare(make.approximate(), make.truth(), frames=1, session=gl, progress=True, **limits)
+    shown = [text.strip() for text in capsys.readouterr().err.split("\r") if "of truth" in text]
+    assert " 0 of 100 % of truth, 0 samples" in shown[0]
+    assert "% of truth, 96 samples, noise " in shown[-1]
+    parts = [int(text.split(" of 100 %")[0].split()[-1]) for text in shown]
+    assert parts == sorted(parts)
     assert found.reference.samples == 112  # the first whole frame
-    assert any("after 112 samples is" in note and "--reference-samples" in note for note in found.notes)
+    assert any("after 112 samples is" in note and "--reference-samples 100 ended it" in note for note in found.notes)
 
 
 def test_the_truth_is_cached_and_drawn_again_only_if_it_must_be_more_exact(

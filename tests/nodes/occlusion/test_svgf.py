@@ -114,7 +114,9 @@ def test_a_plate_that_glows_leaves_no_trail_on_the_floor_in_its_plane(session: r
     moving.write_text(text.replace("cameras:", f"{keys}cameras:"))
     pictures = {}
     for instance in ("light.instance", "null"):
-        *_, before, last = frames(session, moving, 8, "filter.luminance_tolerance=0", f"filter.instance={instance}", still=None)
+        *_, before, last = frames(
+            session, moving, 8, "filter.luminance_tolerance=0", f"filter.instance={instance}", still=None
+        )
         pictures[instance] = last["smooth"]
         left = (before["raw"][..., 0] > 2) & (last["raw"][..., 0] < 2)  # what the plate has just uncovered
     assert left.sum() > 5
