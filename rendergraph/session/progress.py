@@ -48,8 +48,8 @@ class Bar:
             return
         if self._before < 0:  # what was there already took no time
             self._begun, self._before = time.monotonic(), done
-        full = _WIDTH * done // max(1, total)
-        text = f"{'█' * full}{'·' * (_WIDTH - full)} {done} of {total} {self._word() if callable(self._word) else self._word}"
+        full, word = _WIDTH * done // max(1, total), self._word() if callable(self._word) else self._word
+        text = f"{'█' * full}{'·' * (_WIDTH - full)} {done} of {total} {word}"
         text += _pace(done - self._before, total - done, time.monotonic() - self._begun)
         self._longest = max(self._longest, len(text))
         encoding = getattr(sys.stderr, "encoding", None) or "utf-8"
