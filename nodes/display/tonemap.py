@@ -6,13 +6,16 @@ pipeline uses this node, so that each start would import the reader of headers.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
+from typing import Any as PlainAny
 
 from rendergraph.api import (
     Any,
     DisplayColor,
     ExposureGain,
+    Facts,
     Input,
+    InputFile,
     Internal,
     Node,
     Output,
@@ -20,10 +23,20 @@ from rendergraph.api import (
     Steps,
     define,
     param,
+    structural,
 )
+
+if TYPE_CHECKING:
+    from ._look import Look
 
 ACES2_SIDE = 65
 """Entries of the table of `aces2` along each channel: then 99 % of the values are within a step of 8 bits."""
+
+
+def _look_side(node: PlainAny, facts: Facts) -> int:
+    """Return the number of entries of the look along a side, 1 without one."""
+    look = node.loaded_look()
+    return 1 if look is None else len(look.table)
 
 
 class Tonemap(Node):
@@ -39,6 +52,11 @@ class Tonemap(Node):
 
     White balance is a von Kries adaptation in the cone space of Bradford (Lam 1985). Both whites are blackbodies (fit
     by Kim et al. 2002), so 6500 K changes nothing.
+
+    A `look` is a table of colours. Tables in files (`.cube`, and what else OpenColorIO reads: `.3dl`, `.csp`, `.clf`,
+    `.cdl` and so on) take and give display colours, as photo editors apply them: after the tone curve and the transfer
+    function. A configuration of OpenColorIO (`.ocio`) has looks with names. They apply to scene-linear light with the
+    primaries of Rec. 709, after exposure and before the tone curve. Tables of colours are interpolated tetrahedrally.
 
     The picture has 8 bits per channel, which show as bands in slow gradients. `dither` adds a fraction of a step before
     rounding, the same at a pixel in all frames and pictures: equal values stay equal, exact 8-bit values are unchanged,
@@ -60,6 +78,23 @@ class Tonemap(Node):
         Any, kind="texture3d", format="rgba16", size=(ACES2_SIDE, ACES2_SIDE), layers=ACES2_SIDE, kept=True
     )
 
+    look_table = Internal(
+        Any,
+        kind="texture3d",
+        format="rgba32f",
+        size=lambda node, facts: (_look_side(node, facts),) * 2,
+        layers=_look_side,
+        kept=True,
+        doc="Colours of a look.",
+    )
+    look_curve = Internal(
+        Any,
+        format="rgba32f",
+        size=lambda node, facts: (_look_side(node, facts), 1),
+        kept=True,
+        doc="A look that maps each channel by itself.",
+    )
+
     exposure: float = param(default=0.0, unit="EV", min=-32, max=32, doc="Stops added before the curve.")
     white_balance: float = param(
         default=6500.0,
@@ -76,6 +111,10 @@ class Tonemap(Node):
         ]
         | str
     ) = define(default="neutral", doc="Tone curve after exposure.", choices="curve", needs=("curve_table",))
+    look: InputFile | None = structural(
+        default=None, doc="A colour table (`.cube` and others) or a configuration of OpenColorIO (`.ocio`)."
+    )
+    look_name: str = structural(default="", doc="The look of a configuration; by default its first.")
     white: float = param(
         default=4.0,
         min=0.01,
@@ -83,14 +122,38 @@ class Tonemap(Node):
     )
     dither: bool = define(default=True, doc="Break up the bands of 8 bits by a pattern that is the same in all frames.")
 
+    def loaded_look(self) -> Look | None:
+        """Return the look, None without one.
+
+        Raises:
+            ValueError: its file is malformed, or has no look of that name.
+        """
+        if self.look is None:
+            return None
+        from ._look import load_look  # for looks alone
+
+        return load_look(self.look, self.look_name)
+
+    def validate(self) -> None:
+        """Refuse a malformed look."""
+        self.loaded_look()
+
     def record(self, steps: Steps) -> None:
-        """Record the mapping, and before it the table of a curve that needs one."""
-        if "curve_table" not in steps.needs("curve"):
+        """Record the mapping, and before it the tables of a look and of a curve that needs one."""
+        reads: dict[str, PlainAny] = {}
+        defines: dict[str, int] = {}
+        if "curve_table" in steps.needs("curve"):
+            from ._aces2 import table  # OpenColorIO, for this curve alone
+
+            steps.upload(self.curve_table, table(ACES2_SIDE), label="table")
+            reads["curve_table"] = self.curve_table.sampled("linear")
+        if (look := self.loaded_look()) is not None:
+            port = self.look_curve if look.is_curve else self.look_table
+            steps.upload(port, look.texels, label="look")
+            reads |= {port.name: port, "look_low": look.low, "look_high": look.high}
+            defines = {"LOOK_LINEAR" if look.is_linear else "LOOK_DISPLAY": 1}
+            defines |= {"LOOK_CURVE": 1} if look.is_curve else {}
+        if not reads:
             steps.fullscreen("tonemap.frag")
             return
-        from ._aces2 import table  # OpenColorIO, for this curve alone
-
-        steps.upload(self.curve_table, table(ACES2_SIDE), label="table")
-        steps.fullscreen(
-            "tonemap.frag", radiance=self.radiance, gain=self.gain, curve_table=self.curve_table.sampled("linear")
-        )
+        steps.fullscreen("tonemap.frag", radiance=self.radiance, gain=self.gain, defines=defines, **reads)

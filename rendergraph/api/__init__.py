@@ -9,6 +9,7 @@ from rendergraph.declare import History as History
 from rendergraph.declare import Image as Image
 from rendergraph.declare import InOut as InOut
 from rendergraph.declare import Input as Input
+from rendergraph.declare import InputFile as InputFile
 from rendergraph.declare import Internal as Internal
 from rendergraph.declare import LightFacts as LightFacts
 from rendergraph.declare import MaterialFacts as MaterialFacts

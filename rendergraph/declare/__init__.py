@@ -14,7 +14,7 @@ from rendergraph.declare.extensions import (
 )
 from rendergraph.declare.mistakes import RESERVED_NAMES, declaration_mistakes
 from rendergraph.declare.node import DROPPED, Node, type_name
-from rendergraph.declare.parameters import Parameter, define, param, structural
+from rendergraph.declare.parameters import FileContent, InputFile, Parameter, define, param, structural
 from rendergraph.declare.scene_keys import Image, SceneKey, Section, TextureKind
 from rendergraph.facts import CameraFacts, Facts, LightFacts, MaterialFacts, ObjectFacts, TextureInfo, casting_lights
 from rendergraph.ports import (

@@ -4,14 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import cached_property
-from typing import Any, Literal, TypeAlias, get_args, get_origin
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeAlias, get_args, get_origin
 
 from msgspec import Struct
 
-from rendergraph.typecheck import Range, conversion_to, test_of, words_for
+from rendergraph.typecheck import Brief, JsonSchema, Range, conversion_to, test_of, words_for
 
 Role: TypeAlias = Literal["param", "define", "structural", "plain"]
 _is_number = test_of(float)
+
+
+class FileContent(Struct, frozen=True):
+    """The file that a parameter names, relative to the file in which its value stands.
+
+    Attributes:
+        path: of the file, which exists.
+        digest: of its content, so that a changed file is another value.
+    """
+
+    path: Path
+    digest: str
+
+
+InputFile: TypeAlias = Annotated[
+    FileContent, "a file's name", Brief("path"), JsonSchema(lambda: {"type": "string", "minLength": 1})
+]
+"""The type of a parameter that names a file: `look: InputFile | None = structural(default=None, doc=…)`."""
 
 
 class Parameter(Struct, frozen=True, dict=True):

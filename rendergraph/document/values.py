@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
@@ -28,6 +29,10 @@ class Source(Struct, eq=False, dict=True):
     origin: str | Option
     path: Path | None = None
     text: str = ""
+
+    def beside(self, name: str) -> Path:
+        """Return the path that a name in it stands for, relative to the current folder if it is no file."""
+        return Path(os.path.normpath((self.path.parent if self.path else Path()) / name))
 
     @cached_property
     def _starts(self) -> list[int]:

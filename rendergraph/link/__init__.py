@@ -251,7 +251,7 @@ class _Linker(Struct, eq=False):
         return found
 
     def _bind(self, spec: NodeSpec, node_type: NodeType) -> UnlinkedNode:
-        node, problems = instance(spec, node_type)
+        node, problems = instance(spec, node_type, self.spec.source_roots)
         choices, wrong = choice_files(spec, node_type, node, self.catalog.extensions)
         self.missing += wrong if self.spec.missing else ()
         for problem in (*problems, *wrong):

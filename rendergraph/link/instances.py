@@ -5,29 +5,41 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Mapping
+from hashlib import sha1
 from pathlib import Path
 from typing import Any
 
 from msgspec.structs import replace
 
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.declare import Extensions, Input, Node, Output, Parameter
+from rendergraph.declare import Extensions, FileContent, Input, Node, Output, Parameter
 from rendergraph.declare.blame import author_problem
-from rendergraph.document import Value, describe, shown
+from rendergraph.document import Source, Value, describe, shown
 from rendergraph.errors import InputError, Problem, is_interruption, nearest, node_named, shown_file, suggestion
 from rendergraph.glsl.source import needs, needs_place
 from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.resolve import NodeSpec, PipelineSpec
-from rendergraph.settings import nearest_settings
+from rendergraph.settings import Roots, nearest_settings
 from rendergraph.textures import Any as AnyTexture
+from rendergraph.typecheck import accepts
 
 
-def instance(spec: NodeSpec, node_type: NodeType) -> tuple[Node, list[Problem]]:
-    """Return the node, with defaults for parameters that are wrong, and the problems."""
+def instance(spec: NodeSpec, node_type: NodeType, source_roots: Mapping[Source, Roots]) -> tuple[Node, list[Problem]]:
+    """Return the node, with defaults for parameters that are wrong, and the problems.
+
+    `source_roots` are those of the `PipelineSpec`.
+    """
     cls, parameters = node_type.cls, node_type.cls.parameters()
     unknown = [name for name in spec.params if name not in parameters]
     problems = [_unknown(spec.params[name], name, node_type) for name in unknown[:MOST_PROBLEMS]]
     values = {name: value.plain() for name, value in spec.params.items() if name in parameters}
+    for name, plain in tuple(values.items()):
+        if isinstance(plain, str) and accepts(parameters[name].type, FileContent):
+            try:
+                values[name] = _file(spec.params[name], source_roots)
+            except InputError as error:
+                problems += error.problems
+                del values[name]
     try:
         return cls(**values), problems
     except BaseException as error:  # its own check is the author's code
@@ -37,7 +49,18 @@ def instance(spec: NodeSpec, node_type: NodeType) -> tuple[Node, list[Problem]]:
         if not unfit:
             return cls(), problems or [_refused(spec, node_type, values, error)]
         fit = {name: value for name, value in spec.params.items() if name in values and name not in unfit}
-        return instance(replace(spec, params=fit), node_type)[0], [*problems, *unfit.values()]
+        return instance(replace(spec, params=fit), node_type, source_roots)[0], [*problems, *unfit.values()]
+
+
+def _file(value: Value, source_roots: Mapping[Source, Roots]) -> FileContent:
+    path = value.source.beside(text := str(value.data))
+    roots = source_roots.get(value.source) or Roots.of_file(path)  # the user has typed it
+    if mistake := roots.mistake(path, text):
+        raise InputError(value.problem(*mistake))
+    try:
+        return FileContent(path, sha1(path.read_bytes()).hexdigest())
+    except OSError as error:
+        raise InputError(value.problem("RG011", f"the file '{shown(text)}' cannot be read: {error.strerror}")) from None
 
 
 def _unfit(

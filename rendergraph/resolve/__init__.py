@@ -91,6 +91,7 @@ def resolve(
         catalog=files.catalog,
         missing=tuple(files.plugins.missing),
         unrun=files.plugins.unrun,
+        source_roots=files.roots,
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -30,7 +29,7 @@ class Files:
         self.notes: list[Problem] = []
         self.dropped: set[tuple[str, ...]] = set()
         self.removed: dict[str, Value] = {}
-        self._roots: dict[Source, Roots] = {}
+        self.roots: dict[Source, Roots] = {}
         self._trees: dict[Path, Value | None] = {}
         self._names: dict[str, TypeNames | None] = {}
 
@@ -45,12 +44,12 @@ class Files:
 
     def roots_of(self, value: Value) -> Roots:
         """Where the file that contains a value may read from."""
-        return self._roots.get(value.source) or Roots.of_file(Path("x"), self.asset_roots)
+        return self.roots.get(value.source) or Roots.of_file(Path("x"), self.asset_roots)
 
     def own(self, document: Document, roots: Roots | None = None) -> None:
         """Register where a file may read from: its own surroundings if the user named it."""
         around = document.path or Path("x")
-        self._roots[document.source] = roots or Roots.of_file(around, self.asset_roots)
+        self.roots[document.source] = roots or Roots.of_file(around, self.asset_roots)
         self.dropped |= document.dropped
         self.bring(document.root)
 
@@ -65,11 +64,10 @@ class Files:
 
     def typed_roots(self, value: Value) -> Roots:
         """Where a `type` may lead; a path typed on the command line may be anywhere."""
-        return self._roots.get(value.source) or Roots.of_file(self.beside(value), self.asset_roots)
+        return self.roots.get(value.source) or Roots.of_file(self.beside(value), self.asset_roots)
 
     def beside(self, value: Value) -> Path:
-        path = value.source.path
-        return Path(os.path.normpath((path.parent if path else Path()) / str(value.data)))
+        return value.source.beside(str(value.data))
 
     def locate(self, value: Value, shipped: dict[str, Path], what: str) -> tuple[Path, Roots] | None:
         """Return the file a value names and where that may read from; report a problem and return None otherwise."""

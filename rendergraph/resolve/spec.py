@@ -140,6 +140,7 @@ class PipelineSpec(Struct, frozen=True, eq=False):
         scene: the scene's file, if there is one.
         scene_changes: the mapping of the pipeline that is merged into the scene, or is the scene.
         roots: where the scene may read from; `roots.check(path, place)`.
+        source_roots: where files that parameters name may be, by the file in which they stand.
         scopes: sub-pipelines by scope (`glow/`).
         tree: the resolved file, sub-pipelines in place of their names.
         problems: mistakes found so far; `link` raises them with its own, so that a user sees all at once.
@@ -167,6 +168,7 @@ class PipelineSpec(Struct, frozen=True, eq=False):
     catalog: Catalog | None = None
     missing: tuple[str, ...] = ()
     unrun: Mapping[str, str] = {}
+    source_roots: Mapping[Source, Roots] = {}
 
     @property
     def scene_name(self) -> str:

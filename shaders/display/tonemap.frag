@@ -26,6 +26,9 @@ out vec4 color;              // display-referred
 #if DITHER
 #include <noise.glsl>
 #endif
+#if defined(LOOK_LINEAR) || defined(LOOK_DISPLAY)
+#include "look.glsl"
+#endif
 
 // White balance, contrast about middle grey and saturation. Values that change nothing are skipped, so that the picture
 // keeps every bit.
@@ -47,9 +50,16 @@ void main() {
         vec3 light = texelFetch(radiance, ivec2(gl_FragCoord.xy), i).rgb;
         broken = broken || any(isnan(light));
         vec3 scene = max(light, 0.0) * scale;
-        sum += clamp(tone_curve(graded(min(scene, 1e9))), 0.0, 1.0);
+        scene = graded(min(scene, 1e9));
+#ifdef LOOK_LINEAR
+        scene = linear_look(scene);
+#endif
+        sum += clamp(tone_curve(scene), 0.0, 1.0);
     }
     color = vec4(linear_to_srgb(sum / float(RADIANCE_SAMPLES)), 1.0);
+#ifdef LOOK_DISPLAY
+    color.rgb = clamp(through_table(color.rgb), 0.0, 1.0);
+#endif
 #if DITHER
     color.rgb += (interleaved_gradient_noise(gl_FragCoord.xy) - 0.5) * (0.998 / 255.0);  // keeps exact 8-bit values
 #endif

@@ -1,8 +1,12 @@
 // Shadow catchers of paths. What a catcher shows where nothing shadows it is known: paths collect only the difference
 // that surfaces make to it, so that the picture is without noise where there is none (P. Debevec, "Rendering Synthetic
-// Objects into Real Scenes", 1998).
+// Objects into Real Scenes", 1998). Without catchers nothing of this is compiled.
+struct CaughtPath {
+    bool leaves;    // the vertex before is on a catcher
+    bool is_plain;  // that of the camera is, and darkens the plain background
+};
+
 #if defined(SCENE_ANY_SHADOW_CATCHER) && SOURCES == SOURCES_ALL && !defined(NEEDS_NOTHING)
-#define CATCHES_SHADOWS
 #include <shadow_catcher.glsl>
 
 // Makes a surface a catcher and returns what it shows without shadows; false if it is none. To the camera it shows what
@@ -30,4 +34,50 @@ bool catches_path(inout Surface s, int instance, bool is_camera, out bool is_pla
     s.f90 = CATCHER_F90 * polish;
     return true;
 }
+
+// Light from behind all surfaces makes no difference to what a catcher shows.
+vec3 behind_catcher(CaughtPath caught, vec3 behind) {
+    return caught.leaves ? vec3(0.0) : behind;
+}
+
+// Light to add where a path from a catcher meets a surface, which takes light of the environment away, and where it
+// meets a catcher, which `s` then becomes.
+vec3 meet_catcher(
+    inout CaughtPath caught, inout Surface s, int instance, vec3 direction, int vertex, float density, float chance) {
+    vec3 sum = vec3(0.0), shown;
+    bool is_plain;
+    if (caught.leaves && is_wanted(vertex - 1)) sum -= light_behind(direction, false, density, chance);
+    caught.leaves = catches_path(s, instance, vertex == 0, is_plain, shown);
+    caught.is_plain = caught.is_plain || is_plain;
+    if (caught.leaves && is_wanted(vertex)) sum += shown;
+    return sum;
+}
+
+// The surface that punctual lights shine on: there are no highlights in what a catcher shows.
+Surface lit_catcher(CaughtPath caught, Surface s, bool by_lights) {
+    if (caught.leaves && by_lights) {
+        s.f0 = vec3(0.0);
+        s.f90 = 0.0;
+    }
+    return s;
+}
+
+// Part of the light of a source that is in what the surface shows.
+float shown_already(CaughtPath caught, bool is_in_unshadowed) {
+    return caught.leaves && is_in_unshadowed ? 1.0 : 0.0;
+}
+
+// Where the background is plain, the radiance is what remains of white.
+void end_catcher(CaughtPath caught, inout vec3 radiance, inout float coverage) {
+    if (caught.is_plain) {
+        coverage = 1.0 - luminance_of(radiance);
+        radiance *= background;
+    }
+}
+#else
+#define behind_catcher(caught, behind) behind
+#define meet_catcher(caught, s, instance, direction, vertex, density, chance) vec3(0.0)
+#define lit_catcher(caught, s, by_lights) s
+#define shown_already(caught, is_in_unshadowed) 0.0
+#define end_catcher(caught, radiance, coverage)
 #endif

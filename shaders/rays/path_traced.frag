@@ -35,10 +35,7 @@ void main() {
     vec3 throughput = vec3(1.0), radiance = vec3(0.0), origin = vec3(0.0), direction = vec3(0.0, 0.0, 1.0);
     float nearest = 0.0, farthest = 1e30, density = 0.0, coverage = 0.0;
     vec3 chances = vec3(0.0);  // at the vertex before
-#ifdef CATCHES_SHADOWS
-    bool leaves_catcher = false;  // the vertex before is on a shadow catcher
-    bool is_plain = false;        // and that of the camera, which darkens the plain background
-#endif
+    CaughtPath caught = CaughtPath(false, false);
     while (path < PATHS) {
         uint point = uint(path % BATCH);
         if (vertex < 0) {
@@ -58,19 +55,13 @@ void main() {
             coverage = 0.0;
             density = 0.0;
             vertex = 0;
-#ifdef CATCHES_SHADOWS
-            leaves_catcher = false;
-            is_plain = false;
-#endif
+            caught = CaughtPath(false, false);
         }
         uint dimension = random + uint(vertex) * 8u + ahead * 0x10000u;
         bool ends = true;
         Hit hit;
         if (!trace(origin, direction, nearest, farthest, 0, 0, false, hit)) {
-            vec3 behind = light_behind(direction, vertex == 0, density, chances.y);
-#ifdef CATCHES_SHADOWS
-            if (leaves_catcher) behind = vec3(0.0);  // no difference
-#endif
+            vec3 behind = behind_catcher(caught, light_behind(direction, vertex == 0, density, chances.y));
             if (is_wanted(vertex - 1)) radiance += throughput * behind;
         } else {
             int flags = scene_instances[hit.instance].flags;
@@ -95,16 +86,7 @@ void main() {
                 ends = false;
             } else {
                 coverage = 1.0;
-#ifdef CATCHES_SHADOWS
-                if (leaves_catcher && is_wanted(vertex - 1)) {  // the surface takes this light away
-                    radiance -= throughput * light_behind(direction, false, density, chances.y);
-                }
-                bool is_plain_here;
-                vec3 shown;
-                leaves_catcher = catches_path(s, hit.instance, vertex == 0, is_plain_here, shown);
-                is_plain = is_plain || is_plain_here;
-                if (leaves_catcher && is_wanted(vertex)) radiance += throughput * shown;
-#endif
+                radiance += throughput * meet_catcher(caught, s, hit.instance, direction, vertex, density, chances.y);
 #ifdef USES_EMISSION
                 bool is_unlit = s.lit == 0.0;
 #ifdef NEEDS_NOTHING
@@ -128,26 +110,13 @@ void main() {
                     int light = choose_light(s, choice.y, light_chance, lights_sum);
                     chances = source_chances(s.position, lights_sum);
                     vec3 start = offset_ray(s.position, s.geometric_normal);
-#ifdef CATCHES_SHADOWS
-                    Surface lit = s;
-                    if (leaves_catcher && choice.x < chances.x) {  // what is shown has no highlights of lights
-                        lit.f0 = vec3(0.0);
-                        lit.f90 = 0.0;
-                    }
-                    float already_there = leaves_catcher && choice.x < chances.x + chances.y ? 1.0 : 0.0;
-                    SourceSample source =
-                        sample_source(lit, start, chances, choice.x, light, light_chance, point, dimension);
-#else
-                    SourceSample source =
-                        sample_source(s, start, chances, choice.x, light, light_chance, point, dimension);
-#endif
+                    SourceSample source = sample_source(lit_catcher(caught, s, choice.x < chances.x), start, chances,
+                        choice.x, light, light_chance, point, dimension);
                     vec3 arriving = source.reflected;
                     bool reaches = dot(source.direction, s.geometric_normal) > 0.0 && is_wanted(vertex)
                         && max(max(arriving.x, arriving.y), arriving.z) > 0.0;
                     float passed = visibility(start, source.direction, reaches ? source.reach : 0.0, source.casting);
-#ifdef CATCHES_SHADOWS
-                    passed -= already_there;
-#endif
+                    passed -= shown_already(caught, choice.x < chances.x + chances.y);
                     if (reaches) radiance += throughput * arriving * passed;
 
                     // The next ray.
@@ -177,12 +146,7 @@ void main() {
             }
         }
         if (ends) {
-#ifdef CATCHES_SHADOWS
-            if (is_plain) {  // `radiance` is what remains of white
-                coverage = 1.0 - luminance_of(radiance);
-                radiance *= background;
-            }
-#endif
+            end_catcher(caught, radiance, coverage);
             batch += vec4(radiance, coverage);
             vertex = -1;
             ahead = 0u;
