@@ -294,7 +294,7 @@ def _set_by(option: str, settings: Sequence[str], selection: Selection) -> Pipel
 
 def load_reference(reference: str | None, select: options.Select) -> Path | Pipeline | None:
     """Return the reference: a picture's path, or a pipeline with the same scene, without the variants' settings."""
-    from rendergraph.pipelines.references import reference_selection
+    from rendergraph.extras.references import reference_selection
     from rendergraph.session.picture_metadata import is_picture
 
     if reference is None:

@@ -8,11 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from msgspec.structs import replace
-
-import rendergraph as rg
-from rendergraph.images import read
-from rendergraph.viewer import camera as cameras
-from rendergraph.viewer.messages import (
+from rendergraph.extras.viewer import camera as cameras
+from rendergraph.extras.viewer.messages import (
     ChangedFilesRequest,
     CompareRequest,
     PixelRequest,
@@ -21,7 +18,10 @@ from rendergraph.viewer.messages import (
     ThumbnailRequest,
     VariantRequest,
 )
-from rendergraph.viewer.render_service import RenderService, texel, texture_statistics
+from rendergraph.extras.viewer.render_service import RenderService, texel, texture_statistics
+
+import rendergraph as rg
+from rendergraph.images import read
 
 SIZE = (64, 36)
 FORWARD = rg.Selection("forward", size=SIZE)
