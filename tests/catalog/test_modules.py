@@ -168,6 +168,7 @@ def test_a_port_that_others_refer_to_is_not_dropped_alone(plugin: Path) -> None:
 
 
 @pytest.mark.slow
-def test_it_passes_check_node(plugin: Path) -> None:
-    plain = Catalog.discover([plugin]).get("plain_lighting")
-    assert examine(plain, renders=lambda variant: not variant.name).mistakes == ()
+@pytest.mark.parametrize("name", ["hard_shadows", pytest.param("plain_lighting", marks=pytest.mark.nightly)])
+def test_it_passes_check_node(plugin: Path, name: str) -> None:
+    found = Catalog.discover([plugin]).get(name)
+    assert examine(found, renders=lambda variant: not variant.name).mistakes == ()

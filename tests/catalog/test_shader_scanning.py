@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rendergraph.catalog import Catalog, NodeType
@@ -180,6 +180,7 @@ KINDS: dict[str, Any] = {
 
 
 @pytest.mark.slow
+@settings(max_examples=30)
 @given(st.data())
 def test_what_is_written_is_what_is_read(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     """Random declarations in random layouts, printed and scanned."""
@@ -220,7 +221,7 @@ def test_any_text_is_scanned_to_an_end(text: str) -> None:
     globals_of(text)
 
 
-SIZE = 300_000
+SIZE = 100_000
 
 
 @pytest.mark.slow
@@ -243,7 +244,7 @@ SIZE = 300_000
 def test_text_that_repeats_itself_is_read_in_time(tmp_path: Path, text: str) -> None:
     start = time.monotonic()
     load(tmp_path, f"out vec4 c;\nvoid main() {{ c = vec4(1.0); }}\n{text}\n")
-    assert time.monotonic() - start < 20  # it takes one; in quadratic time it would take an hour
+    assert time.monotonic() - start < 20  # it takes less than one; in quadratic time it would take minutes
 
 
 def test_an_include_of_blanks_is_read_in_time(tmp_path: Path) -> None:

@@ -88,6 +88,7 @@ def slow(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("words", [("run",), ("bench",), ("compare", "slow.yaml"), ("view", "--no-open")], ids=str)
 def test_ctrl_c_ends_a_draw_that_hangs_within_two_seconds(slow: Path, words: tuple[str, ...]) -> None:
     process = start(slow, *words, "slow.yaml", "--plugin", "slow.frag")

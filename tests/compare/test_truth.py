@@ -495,11 +495,11 @@ def test_traced_occlusion_explains_the_error_of_the_screen_s(
     monkeypatch.setenv("RENDERGRAPH_CACHE", str(tmp_path))
     (tmp_path / "none.frag").write_text("out vec4 color;\nvoid main() { color = vec4(0.0); }\n")
     (tmp_path / "truth.yaml").write_text(
-        "rendergraph: 1\nextends: traced-occlusion\nnodes:\n  ao: {params: {samples: 256}}\n"
+        "rendergraph: 1\nextends: traced-occlusion\nnodes:\n  ao: {params: {samples: 128}}\n"
         "  none: {type: ./none.frag}\noutputs: {variance: none.color}\n"
     )
     options: Any = {"executor": executor} if executor != "serial" else {"session": gl}
-    pipeline = rg.load("ssao-gtao", size=(64, 36))
+    pipeline = rg.load("ssao-gtao", size=(48, 27))
     found = compare([pipeline, pipeline.set("ao.samples", 8)], str(tmp_path / "truth.yaml"), frames=1, **options)
     for result in found.results:
         (error,) = (one for one in result.error_by if one.node == "ao")

@@ -145,7 +145,7 @@ KINDS = st.sampled_from(["mix", "tally", "stamp"])
 
 
 @pytest.mark.slow
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], derandomize=True)
+@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], derandomize=True)
 @given(
     parents=st.lists(
         st.tuples(KINDS, st.integers(0, 30), st.integers(0, 30), st.integers(0, 5)), min_size=2, max_size=12
@@ -173,7 +173,7 @@ def small(name: str) -> rg.Pipeline:
 
 
 @pytest.mark.slow
-@pytest.mark.nightly(keep=20)
+@pytest.mark.nightly(keep=10)
 @pytest.mark.parametrize("name", sorted(shipped_pipelines()))
 def test_shipped_pipelines_draw_the_same_in_another_order_with_poisoned_memory(gl: rg.Session, name: str) -> None:
     plain = gl.render(small(name), alias=False, warm_up=False)

@@ -130,7 +130,7 @@ def test_a_shader_sees_the_time_however_it_names_it(bench: Any, text: str) -> No
 
 
 @pytest.mark.slow
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], derandomize=True)
+@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], derandomize=True)
 @given(
     parents=st.lists(
         st.tuples(KINDS, st.integers(0, 30), st.integers(0, 30), st.integers(0, 5)), min_size=2, max_size=12

@@ -228,14 +228,15 @@ def mutants(value: Any) -> list[Any]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "most"), [("scene", 30), ("sweep", 100), pytest.param("scene", 300, marks=pytest.mark.nightly)]
+    ("kind", "most", "every"),
+    [("scene", 30, 4), ("sweep", 100, 1), pytest.param("scene", 300, 1, marks=pytest.mark.nightly)],
 )
-def test_shipped_files_are_valid_and_mutants_are_as_the_walk_says(kind: str, most: int) -> None:
+def test_shipped_files_are_valid_and_mutants_are_as_the_walk_says(kind: str, most: int, every: int) -> None:
     table, validate, checked = table_of(kind), compiled(kind), 0
-    for text in files(kind):
+    for place, text in enumerate(files(kind)):
         data = parse(text).root.plain()
         assert accepts(validate, data)
-        found = mutants(data)
+        found = mutants(data) if place % every == 0 else []
         for mutant in found[:: len(found) // most + 1]:
             validator = Validator(CODES)
             validator.file(from_plain(mutant, Source("mutant")), table, "keys")

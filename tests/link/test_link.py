@@ -431,23 +431,23 @@ def replaced(end: Endpoint) -> Endpoint:
 
 # --- hostile files ---------------------------------------------------------------------------------------------------
 
-BLURS = "".join(f"  n{i}: {{type: blur, inputs: {{source: n{i - 1}.blurred}}}}\n" for i in range(1, 5000))
+BLURS = "".join(f"  n{i}: {{type: blur, inputs: {{source: n{i - 1}.blurred}}}}\n" for i in range(1, 2000))
 HOSTILE = {
     "long chain": "nodes:\n  n0: {type: blur, inputs: {source: sky.radiance}}\n" + BLURS + "  sky: {type: sky}\n"
-    "outputs: {o: n4999.blurred}\n",
-    "long circle": "nodes:\n  n0: {type: blur, inputs: {source: n4999.blurred}}\n"
+    "outputs: {o: n1999.blurred}\n",
+    "long circle": "nodes:\n  n0: {type: blur, inputs: {source: n1999.blurred}}\n"
     + BLURS
     + "outputs: {o: n0.blurred}\n",
     "unknown nodes": "nodes:\n"
-    + "".join(f"  name{i}: {{type: blur, inputs: {{source: nome{i}x.blurred}}}}\n" for i in range(5000))
+    + "".join(f"  name{i}: {{type: blur, inputs: {{source: nome{i}x.blurred}}}}\n" for i in range(2000))
     + "outputs: {o: name1.blurred}\n",
-    "unknown params": "nodes: {a: {type: blur, params: {" + ", ".join(f"radios{i}: 1" for i in range(20000)) + "}}}\n",
-    "unknown keys": "".join(f"nodes{i}: 1\n" for i in range(20000)),
-    "unknown inputs": "nodes: {a: {type: blur, inputs: {" + ", ".join(f"from{i}: a.b" for i in range(20000)) + "}}}\n",
-    "unknown types": "nodes:\n" + "".join(f"  n{i}: {{type: blurr{i}}}\n" for i in range(5000)) + "outputs: {o: n1.x}",
-    "long names": f"nodes: {{{'a' * 400_000}: {{type: {'b' * 400_000}}}}}\noutputs: {{o: {'c' * 400_000}.d}}\n",
-    "long type": f"nodes: {{a: {{type: {'b' * 1_000_000}}}}}\noutputs: {{o: a.d}}\n",
-    "many links": "nodes: {l: {type: forward_lighting, inputs: {lookup: [" + "s.lookup, " * 30000 + "]}}}\n"
+    "unknown params": "nodes: {a: {type: blur, params: {" + ", ".join(f"radios{i}: 1" for i in range(8000)) + "}}}\n",
+    "unknown keys": "".join(f"nodes{i}: 1\n" for i in range(8000)),
+    "unknown inputs": "nodes: {a: {type: blur, inputs: {" + ", ".join(f"from{i}: a.b" for i in range(8000)) + "}}}\n",
+    "unknown types": "nodes:\n" + "".join(f"  n{i}: {{type: blurr{i}}}\n" for i in range(2000)) + "outputs: {o: n1.x}",
+    "long names": f"nodes: {{{'a' * 200_000}: {{type: {'b' * 200_000}}}}}\noutputs: {{o: {'c' * 200_000}.d}}\n",
+    "long type": f"nodes: {{a: {{type: {'b' * 400_000}}}}}\noutputs: {{o: a.d}}\n",
+    "many links": "nodes: {l: {type: forward_lighting, inputs: {lookup: [" + "s.lookup, " * 10000 + "]}}}\n"
     "outputs: {o: l.radiance}",
 }
 
@@ -458,7 +458,7 @@ def test_hostile_files_are_answered_soon(toy_catalog: Catalog, name: str) -> Non
     start = time.process_time()
     said = problems(HOSTILE[name], toy_catalog) if name != "long chain" else []
     graph = linked(HOSTILE[name], toy_catalog) if name == "long chain" else None
-    assert time.process_time() - start < 20  # an attack takes minutes; a slow machine does not
+    assert time.process_time() - start < 8  # an attack takes longer by far; a slow machine does not
     assert len(said) <= 200
     assert all(len(text) < 500 for text in said)
-    assert graph is None or len(graph.nodes) == 5001
+    assert graph is None or len(graph.nodes) == 2001

@@ -162,15 +162,15 @@ def test_sampled_lobes_are_the_integrated_ones(asked: Asked, tmp_path: Path) -> 
 
     up = np.cos((np.arange(32) + 0.5) / 32 * np.pi)
     write(tmp_path / "env.exr", np.broadcast_to(1 + 0.9 * up[:, None, None], (32, 64, 3)).astype(np.float32))
-    directions = np.random.default_rng(5).normal(size=(60, 3))
+    directions = np.random.default_rng(5).normal(size=(30, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    lobes = np.repeat([0.2, 0.6, 1.0], 20)
+    lobes = np.repeat([0.2, 0.6, 1.0], 10)
     whole = asked(tmp_path / "env.exr", directions, lobes)
-    many = ("environment.samples=1024", "environment.level_bias=-1")  # each direction stands for little
+    many = ("environment.samples=256", "environment.level_bias=-1")  # each direction stands for little
     sampled = asked(tmp_path / "env.exr", directions, lobes, "environment.integrated_from=2", *many)
     np.testing.assert_allclose(sampled, whole, atol=0.01)
     mixed = asked(tmp_path / "env.exr", directions, lobes, "environment.integrated_from=0.5")
-    np.testing.assert_array_equal(mixed[20:], whole[20:])
+    np.testing.assert_array_equal(mixed[10:], whole[10:])
 
 
 @pytest.mark.parametrize("smith", ["exact", "fast"])

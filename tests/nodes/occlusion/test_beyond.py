@@ -125,7 +125,7 @@ cameras: {{main: {{eye: [-0.041, 1.043, 3.7], target: [0.013, 0.98, 0], fov_y_de
 """
 
     def error(pipeline: str, *sets: str) -> tuple[float, float, float]:
-        sets = ("gi.samples=64", "sun.light=all", "sun.resolution=512", *sets)
+        sets = ("gi.samples=32", "sun.light=all", "sun.resolution=256", *sets)
         found = draw(pipeline, scene, "gi.reflected", *sets, size=(96, 96))[judged]
         away = np.sqrt(np.mean((found - truth[judged]) ** 2)) / truth[judged].mean()
         return away, found.sum() / truth[judged].sum(), np.corrcoef(found.ravel(), truth[judged].ravel())[0, 1]

@@ -183,8 +183,8 @@ def test_both_at_once_are_occlusion_and_light(session: rg.Session) -> None:
 def test_a_filter_takes_noise_and_a_reduced_scale_is_interpolated(session: rg.Session) -> None:
     sets = ("gi.sky=0", "light.ambient=0")
     many, raw, smooth, half = (
-        draw(session, "shapes", *sets, f"gi.samples={samples}", *more, size=(48, 27), x="gi.indirect")["x"]
-        for samples, *more in ((128,), (8,), (8, "gi.denoise=3"), (8, "gi.scale=0.5", "gi.denoise=3"))
+        draw(session, "shapes", *sets, f"gi.samples={samples}", *more, size=(40, 24), x="gi.indirect")["x"]
+        for samples, *more in ((64,), (8,), (8, "gi.denoise=3"), (8, "gi.scale=0.5", "gi.denoise=3"))
     )
     assert np.abs(smooth - many).mean() < 0.7 * np.abs(raw - many).mean()
     for few in (raw, smooth, half):

@@ -241,8 +241,9 @@ def test_maps_hold_the_same_when_the_eye_moves(session: rg.Session, tmp_path: Pa
             y, x = y - 60, x - 60
             a = before[max(y, 0) : 256 + min(y, 0), max(x, 0) : 256 + min(x, 0)]
             b = now[max(-y, 0) : 256 + min(-y, 0), max(-x, 0) : 256 + min(-x, 0)]
-            found[y, x] = float((np.abs(a - b) > 1e-5).mean())
-        move = min(found, key=lambda key: found[key])
-        assert found[move] <= 1e-3
+            found[y, x] = a, b
+        # A few rows decide which move it is, all texels whether the maps are the same.
+        move = min(found, key=lambda key: int((np.abs(found[key][0][::16] - found[key][1][::16]) > 1e-5).sum()))
+        assert (np.abs(found[move][0] - found[move][1]) > 1e-5).mean() <= 1e-3
         moves.append(move)
     assert moves[0] != (0, 0)
