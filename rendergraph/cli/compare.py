@@ -309,12 +309,12 @@ def _write(comparison: Comparison, output: Path, crops: Sequence[Any], *, title:
     """Write a comparison as the extension says: as a page, a figure or a table."""
     suffix = output.suffix.lower()
     if suffix in _FIGURES:
-        from rendergraph.compare.report.figure import save_figure
+        from rendergraph.extras.figures import save_figure
 
         save_figure(comparison, output, crops, note or title)
         return
     if suffix == ".tex":
-        from rendergraph.compare.report.figure import latex_table
+        from rendergraph.extras.figures import latex_table
 
         text = latex_table(*summary(comparison.results))
     elif suffix == ".csv":
