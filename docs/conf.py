@@ -85,8 +85,7 @@ def _link_generated(app: Sphinx, docname: str, source: list[str]) -> None:
     include = "```{include} \\1\n```"
     text = re.sub(r"^<!-- \{include\} (\S+) -->$", include, source[0], flags=re.MULTILINE)
     text = re.sub(r"^\[[^\]]*\]\((\S+)\)<!-- \{include\} -->$", include, text, flags=re.MULTILINE)
-    ours = r"(?:rendergraph|nodes|pipelines|extras|shaders/include)/[^)\s]*"
-    source[0] = re.sub(rf"\]\((?:\.\./)+({ours})\)", linked, text)
+    source[0] = re.sub(r"\]\((?:\.\./)+((?:rendergraph|nodes|pipelines|shaders/include)/[^)\s]*)\)", linked, text)
 
 
 def setup(app: Sphinx) -> None:

@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from rendergraph.compare import Comparison, Result, Sweep, compare, sweep
     from rendergraph.diff import diff
     from rendergraph.errors import RendergraphError
-    from rendergraph.extras.viewer import view
     from rendergraph.metrics import flip
     from rendergraph.session import Frame, Pipeline, RenderOptions, Selection, Session, load, loads
     from rendergraph.session.python_values import Mesh, Object, Scene
     from rendergraph.settings import CacheLimits
+    from rendergraph.viewer import view
 
 _around = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 if os.path.isfile(os.path.join(_around, "pyproject.toml")) and os.path.isdir(os.path.join(_around, "nodes")):
@@ -61,6 +61,6 @@ __getattr__, __dir__ = lazy_exports(
         "session.python_values": ("Mesh", "Object", "Scene"),
         "settings": ("CacheLimits",),
         "version": ("__version__",),
-        "extras.viewer": ("view",),
+        "viewer": ("view",),
     },
 )

@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 NODES = sorted((ROOT / "nodes").rglob("*.py"))
-FRAMEWORK = sorted(file for folder in ("rendergraph", "pipelines", "extras") for file in (ROOT / folder).rglob("*.py"))
+FRAMEWORK = sorted(file for folder in ("rendergraph", "pipelines") for file in (ROOT / folder).rglob("*.py"))
 
 
 @pytest.mark.parametrize("file", NODES, ids=lambda file: file.stem)
@@ -125,8 +125,8 @@ def test_a_problem_is_relocated_and_never_edited_on_its_way_up() -> None:
 def test_mitsuba_is_imported_by_its_own_programs_alone() -> None:
     """It and a software rasteriser do not get on in one process. Of `rendergraph/` import-linter says the same."""
     importers = set()
-    for file in (ROOT / "extras").rglob("*.py"):
+    for file in (ROOT / "pipelines").rglob("*.py"):
         for statement in ast.walk(ast.parse(file.read_text())):
             if isinstance(statement, ast.Import) and {name.name for name in statement.names} & {"mitsuba", "drjit"}:
-                importers.add(str(file.relative_to(ROOT / "extras")))
-    assert importers == {f"mitsuba/{name}.py" for name in ("lights", "render", "surfaces")}
+                importers.add(file.relative_to(ROOT / "pipelines" / "references" / "mitsuba").stem)
+    assert importers == {"lights", "render", "surfaces"}

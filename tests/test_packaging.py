@@ -1,4 +1,4 @@
-"""What travels in the distribution: the five folders, whole, under one import name."""
+"""What travels in the distribution: the four folders, whole, under one import name."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ FOLDERS = {  # where it lies: where it is installed
     "nodes": "rendergraph/nodes",
     "shaders": "rendergraph/shaders",
     "pipelines": "rendergraph/pipelines",
-    "extras": "rendergraph/extras",
 }
 
 
@@ -92,7 +91,7 @@ def test_the_standard_nodes_come_by_the_entry_point() -> None:
     assert found["builtin"] == "rendergraph.nodes"
 
 
-@pytest.mark.parametrize("folder", ["nodes", "shaders", "pipelines", "extras"])
+@pytest.mark.parametrize("folder", ["nodes", "shaders", "pipelines"])
 def test_installed_names_lead_to_the_folders(folder: str) -> None:
     spec = find_spec(f"rendergraph.{folder}")
     assert spec is not None

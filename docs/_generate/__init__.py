@@ -14,7 +14,7 @@ from . import api, cli, errors, files, includes, nodes, pipelines, types
 from .pictures import Studio
 
 ROOT = Path(__file__).parents[2]
-SOURCES = ("rendergraph", "nodes", "shaders", "pipelines", "extras", "docs/_generate")
+SOURCES = ("rendergraph", "nodes", "shaders", "pipelines", "docs/_generate")
 STAMP = ".sources"
 """File in the generated folder: the digest of what its pages were generated from."""
 

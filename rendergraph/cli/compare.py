@@ -294,7 +294,7 @@ def _set_by(option: str, settings: Sequence[str], selection: Selection) -> Pipel
 
 def load_reference(reference: str | None, select: options.Select) -> Path | Pipeline | None:
     """Return the reference: a picture's path, or a pipeline with the same scene, without the variants' settings."""
-    from rendergraph.extras.references import reference_selection
+    from rendergraph.pipelines.references import reference_selection
     from rendergraph.session.picture_metadata import is_picture
 
     if reference is None:
@@ -309,12 +309,12 @@ def _write(comparison: Comparison, output: Path, crops: Sequence[Any], *, title:
     """Write a comparison as the extension says: as a page, a figure or a table."""
     suffix = output.suffix.lower()
     if suffix in _FIGURES:
-        from rendergraph.extras.figures import save_figure
+        from rendergraph.compare.report.figure import save_figure
 
         save_figure(comparison, output, crops, note or title)
         return
     if suffix == ".tex":
-        from rendergraph.extras.figures import latex_table
+        from rendergraph.compare.report.figure import latex_table
 
         text = latex_table(*summary(comparison.results))
     elif suffix == ".csv":

@@ -37,7 +37,7 @@ def command(as_json: bool) -> None:
 
 
 def examine() -> dict[str, Any]:
-    from rendergraph.extras import references
+    from rendergraph.pipelines import references
 
     found = _probe()
     devices = [device | _probe(str(device["number"])) for device in found.get("devices", [])]
@@ -113,7 +113,7 @@ def _advice(found: dict[str, Any], devices: list[dict[str, Any]], packages: dict
 
 
 def _text(report: dict[str, Any]) -> str:
-    from rendergraph.extras import references
+    from rendergraph.pipelines import references
 
     lines = [f"rendergraph {report['rendergraph']}, Python {report['python']}, {report['platform']}"]
     lines.append(", ".join(f"{name} {version or 'MISSING'}" for name, version in report["packages"].items()))

@@ -68,13 +68,13 @@ def command(
       rendergraph view forward --scene helmet.glb --port 8080 --no-open
       rendergraph view forward --size 320x180 --export page.html
     """
-    from rendergraph.extras.viewer import EXTRA
     from rendergraph.installed import require
+    from rendergraph.viewer import EXTRA
 
     require(*EXTRA)
-    from rendergraph.extras.viewer.render_process import RenderProcess
-    from rendergraph.extras.viewer.server import LOOPBACK, Server
-    from rendergraph.extras.viewer.view_state import ViewState
+    from rendergraph.viewer.render_process import RenderProcess
+    from rendergraph.viewer.server import LOOPBACK, Server
+    from rendergraph.viewer.view_state import ViewState
 
     if host not in LOOPBACK and not allow_remote:
         text = (
@@ -91,8 +91,8 @@ def command(
         state = ViewState(selection, Path.cwd(), fps=fps, against=other)
         options.linked(selection)  # reports mistakes before there is a page
         if export is not None:
-            from rendergraph.extras.viewer.export import export_page
             from rendergraph.session.gpu import Gpu
+            from rendergraph.viewer.export import export_page
 
             with Gpu(device) as gpu:
                 options.put(export_page(state, gpu), export, as_json=as_json)

@@ -12,10 +12,10 @@ from rendergraph.lazy import CallableModule, lazy_exports
 
 if TYPE_CHECKING:
     from rendergraph.compare.engine import Sweep, compare, compare_pictures, sweep
+    from rendergraph.compare.optimiser import check_search, search
     from rendergraph.compare.prepare import SweepOptions
     from rendergraph.compare.results import Comparison, Result
     from rendergraph.compare.space import Axis, Space
-    from rendergraph.extras.optimiser import check_search, search
 
 
 sys.modules[__name__].__class__ = CallableModule
@@ -23,7 +23,7 @@ __getattr__, __dir__ = lazy_exports(
     __name__,
     {
         "engine": ("Sweep", "compare", "compare_pictures", "sweep"),
-        ".extras.optimiser": ("check_search", "search"),
+        "optimiser": ("check_search", "search"),
         "prepare": ("SweepOptions",),
         "results": ("Comparison", "Result"),
         "space": ("Axis", "Space"),

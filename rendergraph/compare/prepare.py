@@ -21,9 +21,9 @@ from rendergraph.compare.light import light_of
 from rendergraph.compare.results import Pixels, Reference
 from rendergraph.compare.space import Axes, Space, pipelines, run_name, unique_names
 from rendergraph.errors import InputError, Option, Place, Problem, UsageError
-from rendergraph.extras.references import reference_selection
 from rendergraph.farm.bundle import relocate_selection
 from rendergraph.metrics import Encoding, check_sizes
+from rendergraph.pipelines.references import reference_selection
 from rendergraph.session import stages
 from rendergraph.session.picture_metadata import frame_metadata, is_picture, pipeline_metadata
 from rendergraph.session.pipeline import Pipeline

@@ -283,7 +283,7 @@ class Results(ABC):
         return import_module("pandas").DataFrame(self.to_dict()).set_index("run")
 
     def figure(self, crops: Any = (), *, caption: str = "", errors: bool = False, width: float = 7.0) -> Any:
-        """Return a figure of Matplotlib with the pictures, magnified crops and errors; see `extras.figures.figure`.
+        """Return a figure of Matplotlib with the pictures, magnified crops and errors; see `report.figure.figure`.
 
         Args:
             crops: parts of the picture: left, top, width and height in pixels, also by name.
@@ -291,7 +291,7 @@ class Results(ABC):
             errors: whether a row of FLIP maps follows the pictures.
             width: of the figure, in inches.
         """
-        make = import_module("rendergraph.extras.figures").figure
+        make = import_module("rendergraph.compare.report.figure").figure
         return make(self.whole, crops, caption=caption, errors=errors, width=width)
 
     @property

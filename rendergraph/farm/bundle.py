@@ -24,7 +24,7 @@ from rendergraph.resources import folder
 if TYPE_CHECKING:
     from rendergraph.session.selection import Selection
 
-SHIPPED = tuple(f"rendergraph{part}" for part in ("", ".nodes", ".shaders", ".pipelines", ".extras"))
+SHIPPED = ("rendergraph", "rendergraph.nodes", "rendergraph.shaders", "rendergraph.pipelines")
 MOST_FILES = 20_000
 MOST_BYTES = 16 << 30
 _SKIPPED_FOLDERS = frozenset({"__pycache__", ".git", ".hg", ".venv", "node_modules"})

@@ -65,7 +65,7 @@ def make_executor(
         count, shared = _machine(device, devices)
         return Processes(int(number or count), shared, timeout=timeout)
     require("a Dask cluster", "farm", "distributed")
-    from rendergraph.extras.dask_cluster import connect, start_local_cluster  # an extra
+    from rendergraph.farm.dask_cluster import connect, start_local_cluster  # an extra
 
     if kind == "dask":
         count, shared = _machine(device, devices)

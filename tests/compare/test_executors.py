@@ -18,12 +18,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rendergraph.extras import dask_cluster
 
 import rendergraph as rg
 from rendergraph.compare.engine import Sweep, compare, sweep
 from rendergraph.compare.store import RESULTS, ResultsLog
 from rendergraph.errors import InputError, RenderError, UsageError
+from rendergraph.farm import dask_cluster
 from rendergraph.farm.processes import Processes
 
 distributed: Any = pytest.importorskip("distributed")
@@ -466,7 +466,7 @@ def test_a_plugin_that_a_worker_lacks_is_told_before_anything_runs_and_a_lost_sc
             cluster.scheduler.kill()
 
     out = tmp_path / "out"
-    monkeypatch.setattr("rendergraph.extras.dask_cluster.CONNECT_SECONDS", 2.0)
+    monkeypatch.setattr("rendergraph.farm.dask_cluster.CONNECT_SECONDS", 2.0)
     with pytest.raises(RenderError, match=r"RG641 the Dask scheduler is gone; finished runs are saved"):
         sweep(base, AXES, out, frames=1, executor=f"dask://{cluster.address}", events=kill)
     there = len(rows(out))

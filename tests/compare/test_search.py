@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rendergraph.extras.optimiser import BATCH_SIZE, check_search, search
 
 import rendergraph as rg
+from rendergraph.compare.optimiser import BATCH_SIZE, check_search, search
 from rendergraph.compare.report import sweep_page
 from rendergraph.compare.results import pareto_front
 from rendergraph.compare.space import Space

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from rendergraph.extras.references import reference_selection
+from rendergraph.pipelines.references import reference_selection
 
 import rendergraph as rg
 from rendergraph.api import Depth as DepthTexel

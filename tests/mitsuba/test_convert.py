@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from rendergraph.extras.mitsuba.convert import camera_values, scene_values
+from rendergraph.pipelines.references.mitsuba.convert import camera_values, scene_values
 
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.load import load

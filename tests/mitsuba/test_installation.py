@@ -7,7 +7,7 @@ import sys
 from types import SimpleNamespace
 
 import pytest
-from rendergraph.extras.mitsuba import installation
+from rendergraph.pipelines.references.mitsuba import installation
 
 from rendergraph.compare import compare
 from rendergraph.errors import UsageError

@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from msgspec.structs import replace
-from rendergraph.extras.mitsuba.installation import find_llvm
-from rendergraph.extras.mitsuba.process import Tracer
+from rendergraph.pipelines.references.mitsuba.installation import find_llvm
+from rendergraph.pipelines.references.mitsuba.process import Tracer
 
 import rendergraph as rg
 from rendergraph.compare import compare
@@ -56,7 +56,7 @@ def in_mitsuba(scene: Scene, size: tuple[int, int], script: str, **options: Any)
     head = """
 import json, sys
 from pathlib import Path
-from rendergraph.extras.mitsuba.render import *
+from rendergraph.pipelines.references.mitsuba.render import *
 folder, found = Path(sys.argv[1]), {}
 picture = Picture(json.loads((folder / "request.json").read_text()), dict(np.load(folder / "arrays.npz")))
 scene, camera = picture.scene, picture.request["camera"]

@@ -11,10 +11,10 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
-from rendergraph.extras.viewer.messages import Response
-from rendergraph.extras.viewer.render_process import RenderProcess
 
 import rendergraph as rg
+from rendergraph.viewer.messages import Response
+from rendergraph.viewer.render_process import RenderProcess
 
 FORWARD = rg.Selection("forward", size=(64, 36))
 
@@ -81,8 +81,8 @@ class Served:
 def serve(folder: Path, process: Any, **options: Any) -> Iterator[Served]:
     """A server of `forward`."""
     pytest.importorskip("uvicorn")
-    from rendergraph.extras.viewer.server import Server
-    from rendergraph.extras.viewer.view_state import ViewState
+    from rendergraph.viewer.server import Server
+    from rendergraph.viewer.view_state import ViewState
 
     state = ViewState(FORWARD, folder)
     server = Server(state, process, **options)
@@ -116,7 +116,7 @@ class NoProcess:
 def limited(tmp_path: Path) -> Iterator[Served]:
     """A page with low limits, which shows nothing."""
     pytest.importorskip("uvicorn")
-    from rendergraph.extras.viewer.server import ServerLimits
+    from rendergraph.viewer.server import ServerLimits
 
     limits = ServerLimits(messages_per_second=20, request_seconds=1.0, pages=3)
     with serve(tmp_path, NoProcess(), limits=limits) as found:

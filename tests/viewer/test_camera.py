@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from rendergraph.extras.viewer import camera as cameras
 
 from rendergraph.projection import look_at
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import Camera
+from rendergraph.viewer import camera as cameras
 
 SPHERE = ((0.0, 1.0, 0.0), 2.0)
 

@@ -8,11 +8,11 @@ import signal
 from pathlib import Path
 
 import pytest
-from rendergraph.extras.viewer.messages import RenderRequest
-from rendergraph.extras.viewer.render_process import RenderProcess
 
 import rendergraph as rg
 from rendergraph.errors import DeviceError, RenderError
+from rendergraph.viewer.messages import RenderRequest
+from rendergraph.viewer.render_process import RenderProcess
 
 pytestmark = pytest.mark.slow
 

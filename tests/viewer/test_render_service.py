@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from msgspec.structs import replace
-from rendergraph.extras.viewer import camera as cameras
-from rendergraph.extras.viewer.messages import (
+
+import rendergraph as rg
+from rendergraph.images import read
+from rendergraph.viewer import camera as cameras
+from rendergraph.viewer.messages import (
     ChangedFilesRequest,
     CompareRequest,
     PixelRequest,
@@ -18,10 +21,7 @@ from rendergraph.extras.viewer.messages import (
     ThumbnailRequest,
     VariantRequest,
 )
-from rendergraph.extras.viewer.render_service import RenderService, texel, texture_statistics
-
-import rendergraph as rg
-from rendergraph.images import read
+from rendergraph.viewer.render_service import RenderService, texel, texture_statistics
 
 SIZE = (64, 36)
 FORWARD = rg.Selection("forward", size=SIZE)

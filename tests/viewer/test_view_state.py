@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rendergraph.extras.viewer.messages import parse_message
-from rendergraph.extras.viewer.view_state import MOST_COMPARED, Edits, ViewState
 
 import rendergraph as rg
 from rendergraph.document import parse
 from rendergraph.errors import UsageError
+from rendergraph.viewer.messages import parse_message
+from rendergraph.viewer.view_state import MOST_COMPARED, Edits, ViewState
 
 
 @pytest.fixture

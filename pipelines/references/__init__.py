@@ -1,4 +1,4 @@
-"""Renderers of others, which `--reference NAME` measures against: each a folder here with a plugin and its pipeline."""
+"""Renderers of others, which `--reference NAME` measures against: each a folder with a plugin and its pipeline."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NAMES = ("mitsuba",)
 
 
 def _installation(name: str) -> Any:
-    return import_module(f"rendergraph.extras.{name}.installation")
+    return import_module(f"{__name__}.{name}.installation")
 
 
 def reference_selection(selection: Selection) -> Selection:

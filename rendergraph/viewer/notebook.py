@@ -6,11 +6,10 @@ from collections.abc import Callable
 from html import escape
 from pathlib import Path
 
-from rendergraph.extras.viewer.render_process import RenderProcess
-from rendergraph.extras.viewer.view_state import ViewState
-
 from rendergraph.installed import require
 from rendergraph.session.pipeline import Pipeline, as_pipeline
+from rendergraph.viewer.render_process import RenderProcess
+from rendergraph.viewer.view_state import ViewState
 
 EXTRA = ("the viewer", "view", "starlette", "uvicorn", "websockets")
 """Arguments of `require`."""
@@ -69,7 +68,7 @@ def view(
         UsageError: the extra `view` is not installed, or the port is in use.
     """
     require(*EXTRA)
-    from rendergraph.extras.viewer.server import Server  # needs the extra
+    from rendergraph.viewer.server import Server  # needs the extra
 
     found = as_pipeline(pipeline)
     other = None

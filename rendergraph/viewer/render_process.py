@@ -10,10 +10,9 @@ import contextlib
 import threading
 from multiprocessing.connection import Connection
 
-from rendergraph.extras.viewer.messages import Request, Response
-
 from rendergraph.errors import Problem, RenderError, RendergraphError
 from rendergraph.farm.worker_process import ChildProcess
+from rendergraph.viewer.messages import Request, Response
 
 TIMEOUT = 30.0
 """Seconds that a request may take; the first one of a process may take longer."""
@@ -70,7 +69,7 @@ class RenderProcess:
 
     def _running(self) -> ChildProcess:
         if self._child is None:
-            self._child = ChildProcess("rendergraph.extras.viewer.render_process:main", {"device": self._device})
+            self._child = ChildProcess("rendergraph.viewer.render_process:main", {"device": self._device})
         return self._child
 
     def _loss_error(self, text: str) -> RenderError:
@@ -84,9 +83,8 @@ class RenderProcess:
 
 
 def main(pipe: int, device: int | None) -> None:
-    from rendergraph.extras.viewer.render_service import RenderService  # likewise
-
     from rendergraph.session.gpu import Gpu  # the server, which shares this module, never renders
+    from rendergraph.viewer.render_service import RenderService  # likewise
 
     with Connection(pipe) as end, contextlib.suppress(EOFError, OSError):
         try:

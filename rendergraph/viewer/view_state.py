@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from msgspec import UNSET, structs
-from rendergraph.extras.viewer import camera as cameras
-from rendergraph.extras.viewer import messages
-from rendergraph.extras.viewer.messages import RenderRequest, Response
 
 from rendergraph.errors import Problem, UsageError
 from rendergraph.resources import shipped_pipelines
 from rendergraph.scene.model import Camera
 from rendergraph.session.selection import Selection
+from rendergraph.viewer import camera as cameras
+from rendergraph.viewer import messages
+from rendergraph.viewer.messages import RenderRequest, Response
 
 MOST_UNDO = 500
 MOST_COMPARED = 50

@@ -9,6 +9,6 @@ answered, so the newest state wins and nothing queues up.
 
 from __future__ import annotations
 
-from rendergraph.extras.viewer.notebook import EXTRA, Viewer, view
+from rendergraph.viewer.notebook import EXTRA, Viewer, view
 
 __all__ = ["EXTRA", "Viewer", "view"]

@@ -8,7 +8,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from rendergraph.extras.mitsuba.surfaces import Tables
+from rendergraph.pipelines.references.mitsuba.surfaces import Tables
 
 _FAR = 1e7
 

@@ -17,8 +17,8 @@ import mitsuba as mi
 import numpy as np
 
 mi.set_variant("llvm_ad_rgb")
-from rendergraph.extras.mitsuba.lights import Emission, Punctual, environment  # noqa: E402  they need the variant
-from rendergraph.extras.mitsuba.surfaces import Surface, Tables  # noqa: E402
+from rendergraph.pipelines.references.mitsuba.lights import Emission, Punctual, environment  # noqa: E402  they need the variant
+from rendergraph.pipelines.references.mitsuba.surfaces import Surface, Tables  # noqa: E402
 
 _PASS_RAYS = 1 << 21
 """Camera rays that are traced at once; each takes about 200 bytes."""

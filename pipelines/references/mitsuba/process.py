@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
-from rendergraph.extras.mitsuba.convert import camera_values, scene_values
-from rendergraph.extras.mitsuba.installation import require
+from rendergraph.pipelines.references.mitsuba.convert import camera_values, scene_values
+from rendergraph.pipelines.references.mitsuba.installation import require
 
 from rendergraph.errors import Problem, RenderError
 from rendergraph.images import decode as decode_file
@@ -89,7 +89,7 @@ class Tracer:
         np.savez(self._folder / "arrays.npz", allow_pickle=False, **arrays)
         with open(self._folder / "errors", "w") as errors:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "rendergraph.extras.mitsuba.render", folder.name],
+                [sys.executable, "-m", "rendergraph.pipelines.references.mitsuba.render", folder.name],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=errors,

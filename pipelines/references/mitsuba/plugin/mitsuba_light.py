@@ -6,7 +6,7 @@ from typing import Any, Literal
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from rendergraph.extras.mitsuba.process import Tracer
+from rendergraph.pipelines.references.mitsuba.process import Tracer
 
 from rendergraph.api import Facts, Frame, Internal, Luminance, Node, Output, Radiance, Steps, param, structural
 

@@ -9,14 +9,13 @@ from collections.abc import Mapping
 from html import escape
 from typing import Any
 
-from rendergraph.extras.viewer.messages import CompareRequest, Request, Response, ThumbnailRequest
-from rendergraph.extras.viewer.render_service import RenderService
-from rendergraph.extras.viewer.server import page_files
-from rendergraph.extras.viewer.view_state import ViewState
-
 from rendergraph.errors import InputError, Problem
 from rendergraph.formatting import jsonable
 from rendergraph.session.gpu import Gpu
+from rendergraph.viewer.messages import CompareRequest, Request, Response, ThumbnailRequest
+from rendergraph.viewer.render_service import RenderService
+from rendergraph.viewer.server import page_files
+from rendergraph.viewer.view_state import ViewState
 
 _IMPORT = re.compile(r'^import (?:(\{[^}]*\}) from )?"\./(\w+)\.js";$', re.MULTILINE)
 _EXPORT = re.compile(r"^export ((?:const|function|async function) ([\w$]+))", re.MULTILINE)

@@ -23,10 +23,6 @@ from typing import Any
 
 import msgspec
 import uvicorn
-from rendergraph.extras.viewer import messages
-from rendergraph.extras.viewer.messages import PageMessage, RenderRequest, Request, Response, parse_message
-from rendergraph.extras.viewer.render_process import RenderProcess
-from rendergraph.extras.viewer.view_state import ViewState
 from starlette.applications import Starlette
 from starlette.requests import Request as HttpRequest
 from starlette.responses import PlainTextResponse
@@ -39,6 +35,10 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from rendergraph.errors import Place, Problem, RendergraphError, UsageError
 from rendergraph.formatting import jsonable
 from rendergraph.resources import folder
+from rendergraph.viewer import messages
+from rendergraph.viewer.messages import PageMessage, RenderRequest, Request, Response, parse_message
+from rendergraph.viewer.render_process import RenderProcess
+from rendergraph.viewer.view_state import ViewState
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 WATCH_SECONDS = 0.25
@@ -69,7 +69,7 @@ class ServerLimits:
 
 @cache
 def page_files() -> Mapping[str, bytes]:
-    home = folder("rendergraph.extras") / "viewer" / "page"
+    home = folder("rendergraph") / "viewer" / "page"
     return {str(path.relative_to(home)): path.read_bytes() for path in sorted(home.rglob("*")) if path.suffix in _TYPES}
 
 

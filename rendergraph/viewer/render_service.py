@@ -12,9 +12,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from msgspec.structs import replace
-from rendergraph.extras.viewer import messages
-from rendergraph.extras.viewer.describe import describe
-from rendergraph.extras.viewer.messages import RenderRequest, Request, Response
 
 from rendergraph import images, stamps
 from rendergraph.compile import Executable
@@ -31,6 +28,9 @@ from rendergraph.session.outputs import every_port
 from rendergraph.session.selection import RenderOptions, Selection
 from rendergraph.session.values import Expanded, Linked, Planned
 from rendergraph.stamps import Stamps
+from rendergraph.viewer import messages
+from rendergraph.viewer.describe import describe
+from rendergraph.viewer.messages import RenderRequest, Request, Response
 
 Pixels = npt.NDArray[Any]
 
