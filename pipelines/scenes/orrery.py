@@ -50,10 +50,17 @@ def at(x: float, y: float) -> Doubles:
     return np.array([x, y, 0.0])
 
 
+def around_y(count: int) -> Doubles:
+    """Return points of a circle of radius 1 about Y; the last is the first, to the bit."""
+    angle = np.linspace(0, 2 * np.pi, count + 1)
+    circle = np.stack([np.cos(angle), np.zeros_like(angle), -np.sin(angle)], axis=1)
+    circle[-1] = circle[0]
+    return circle
+
+
 def lathe(profile: Doubles, around: int = AROUND) -> Mesh:
     """Return the surface of revolution of (radius, height) pairs about Y, from the top down, with hard edges."""
-    angle = np.linspace(0, 2 * np.pi, around + 1)
-    circle = np.stack([np.cos(angle), np.zeros_like(angle), -np.sin(angle)], axis=1)
+    circle = around_y(around)
     positions: list[Doubles] = []
     normals: list[Doubles] = []
     faces: list[npt.NDArray[np.int64]] = []
@@ -70,7 +77,7 @@ def lathe(profile: Doubles, around: int = AROUND) -> Mesh:
 
 def sphere(radius: float, y: float = 0.0, rows: int = 16) -> Mesh:
     angle = np.linspace(0, np.pi, rows + 1)
-    positions, _, faces = lathe(np.stack([radius * np.sin(angle), radius * np.cos(angle)], axis=1), 2 * rows)
+    positions, _, faces = lathe(np.round(radius * np.stack([np.sin(angle), np.cos(angle)], axis=1), 9), 2 * rows)
     return positions + at(0, y), positions / radius, faces
 
 
@@ -84,9 +91,8 @@ def ring(inner: float, outer: float, low: float, high: float) -> Mesh:
 
 def gear(teeth: int, radius: float, low: float, high: float) -> Mesh:
     """Return a disc whose rim rises and falls by 6 mm, as many times as it has teeth."""
-    angle = np.linspace(0, 2 * np.pi, 4 * teeth + 1)
     rim = radius + np.where(np.arange(4 * teeth + 1) % 4 < 2, 0.006, -0.006)
-    circle = np.stack([rim * np.cos(angle), np.zeros_like(angle), -rim * np.sin(angle)], axis=1)
+    circle = rim[:, None] * around_y(4 * teeth)
     top, bottom = circle + at(0, high), circle + at(0, low)
     positions: list[Any] = []
     normals: list[Any] = []

@@ -270,6 +270,10 @@ class Executable(Struct, eq=False, dict=True):
             self._write(node, cell, value)
         return None
 
+    def drives(self, node: str, name: str) -> bool:
+        """Whether `set_uniform` of this uniform has an effect: a program that runs in every frame reads it."""
+        return bool(self._cells[node, name])
+
     def _write(self, node: str, cell: _Cell, value: UniformValue) -> None:
         if repr(cell.value) != repr(value):
             cell.value, cell.call = value, cell.draw.program.writer(cell.name, value)

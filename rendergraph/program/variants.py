@@ -78,7 +78,7 @@ def light_macros(scene: Scene, stored: Collection[str]) -> dict[str, str]:
 def scene_macros(scene: Scene, packed: PackedScene, stored: Collection[str]) -> dict[str, str]:
     """Return macros about objects and materials, for geometry steps; unused features are not compiled."""
     macros = {"MATERIAL_COUNT": str(max(1, len(scene.materials)))}
-    moving = {path.partition(".")[0] for path in scene.keyframes}
+    moving = {section for section, *_ in scene.tracks}
     if packed.vertex_orders:
         macros["SCENE_POSED"] = "1"
     if "objects" not in moving and not scene.rigs and _evenly_scaled(packed.instances["rows"]):

@@ -15,8 +15,8 @@ from rendergraph.errors import InputError, Option, Place, Problem, suggestion
 from rendergraph.facts import NO_EXTRA, Extra
 from rendergraph.scene import scene_values
 from rendergraph.scene.cameras import WIDE, bounding_sphere, framing_camera
-from rendergraph.scene.geometry import rigid, translation
-from rendergraph.scene.model import Matrix, Placement, Scene
+from rendergraph.scene.geometry import rigid, translation, vec3
+from rendergraph.scene.model import Matrix, Placement, Scene, Vec3
 from rendergraph.scene.surroundings import grounded, lit
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def moves(scene: Scene) -> bool:
 def length(scene: Scene) -> float:
     """Return the seconds until clips and keyframes end, or an orbit closes; 0 where nothing moves."""
     ends = [rig.length for rig in scene.rigs]
-    ends += [frames[-1][0] for frames in scene.keyframes.values()]
+    ends += [float(curve.times[-1]) for curve in scene.keyframes.values()]
     orbit = abs(scene.orbit.degrees_per_second) if scene.orbit is not None else 0.0
     return max(ends, default=0.0) or (360.0 / orbit if orbit else 0.0)
 
@@ -109,12 +109,12 @@ def at(scene: Scene, time_s: float) -> Scene:
     if not moves(scene):
         return scene
     first, scene = scene, _posed(scene, time_s)
-    changed: dict[tuple[str, str], dict[str, Any]] = {}
-    for path, frames in scene.keyframes.items():
-        section, _, rest = path.partition(".")
-        name, key = ("", rest) if section == "environment" else rest.rpartition(".")[::2]
-        changed.setdefault((section, name), {})[key] = interpolated(frames, time_s)
-    for (section, name), values in changed.items():
+    cameras: dict[str, dict[str, Any]] = {}  # those that follow an object, which has to move first
+    for section, name, curves in first.tracks:
+        values = {key: curve.at(time_s) for key, curve in curves}
+        if section == "cameras" and name in first.follows:
+            cameras[name] = values
+            continue
         recipe = scene.recipe.get((section, name), {})
         added = {key: values.pop(key) for key in scene.plugin_keys.get(section, frozenset()) & values.keys()}
         if added and section == "objects":  # a part of a file may have other values than the whole
@@ -123,8 +123,10 @@ def at(scene: Scene, time_s: float) -> Scene:
             values["extra"] = Extra({**recipe.get("extra", NO_EXTRA), **added})
         if values:
             scene = _changed(scene, section, name, {**recipe, **values})
+    if first.follows:
+        scene = following(scene, cameras)
     # Clips move what is around a target, and not the target.
-    placed = scene if any(section == "objects" for section, _ in changed) else first
+    placed = scene if any(section == "objects" for section, *_ in first.tracks) else first
     return scene if scene.orbit is None else _orbited(scene, time_s, placed)
 
 
@@ -160,13 +162,28 @@ def _over_clips(scene: Scene) -> Scene:
     return replace(scene, objects=(*scene.objects, *changed)) if changed else scene
 
 
-def interpolated(frames: tuple[tuple[float, Any], ...], time_s: float) -> Any:
-    """The value at a time: linear between frames, held outside."""
-    times = [time for time, _ in frames]
-    values = np.array([value for _, value in frames], np.float64)
-    if values.ndim == 1:
-        return float(np.interp(time_s, times, values))
-    return tuple(float(np.interp(time_s, times, column)) for column in values.T)
+def following(scene: Scene, changed: Mapping[str, Mapping[str, Any]]) -> Scene:
+    """Return the scene with its cameras that follow an object turned to it; `changed` are their other new values."""
+    for name, parts in scene.follows.items():
+        recipe = scene.recipe["cameras", name]
+        scene = _changed(scene, "cameras", name, {**recipe, **changed.get(name, {})}, _middle(scene, parts))
+    return scene
+
+
+def _middle(scene: Scene, parts: Iterable[int]) -> Vec3:
+    """The middle of the boxes of some objects at rest; a skin moves it by the mean of its joints, which is steady."""
+    corners = []
+    for placed in (scene.objects[index] for index in parts):
+        low, high = np.array(scene.meshes[placed.mesh].box, np.float64)
+        center, extent = (low + high) / 2, (high - low) / 2
+        if placed.pose is not None and len(placed.pose.joints):
+            mean = placed.pose.joints.mean(axis=0)
+            center = mean[:, :3] @ center + mean[:, 3]
+        center = placed.transform[:3, :3] @ center + placed.transform[:3, 3]
+        extent = np.abs(placed.transform[:3, :3]) @ extent
+        corners += [center - extent, center + extent]
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    return vec3((low + high) / 2)
 
 
 def _orbited(scene: Scene, time_s: float, placed: Scene) -> Scene:
@@ -184,7 +201,7 @@ def _orbited(scene: Scene, time_s: float, placed: Scene) -> Scene:
     return replace(scene, cameras={**scene.cameras, camera.name: replace(camera, transform=transform)})
 
 
-def _changed(scene: Scene, section: str, name: str, values: Mapping[str, Any]) -> Scene:
+def _changed(scene: Scene, section: str, name: str, values: Mapping[str, Any], followed: Vec3 | None = None) -> Scene:
     """The scene with other values of one entry of a section."""
     if section == "objects":
         world, copies = scene_values.placed(values), scene.copies.get(("objects", name))
@@ -199,7 +216,7 @@ def _changed(scene: Scene, section: str, name: str, values: Mapping[str, Any]) -
         return replace(scene, environment=environment, lights=lights)
     try:
         if section == "cameras":
-            return replace(scene, cameras={**scene.cameras, name: scene_values.camera(name, values)})
+            return replace(scene, cameras={**scene.cameras, name: scene_values.camera(name, values, followed)})
         if section == "lights":
             light = scene_values.light(name, values)
             copies = scene.copies.get((section, name))

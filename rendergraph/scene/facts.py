@@ -79,8 +79,9 @@ def camera_facts(scene: Scene) -> CameraFacts:
     """Of the first camera, which is the one that renders."""
     if (camera := scene.camera) is None:
         return CameraFacts()
-    frames = scene.keyframes.get(f"cameras.{camera.name}.shutter", ())
-    return CameraFacts(camera.name, camera.extra, max([camera.shutter, *(value for _, value in frames)]))
+    curve = scene.keyframes.get(f"cameras.{camera.name}.shutter")
+    most = camera.shutter if curve is None else max(camera.shutter, float(curve.values.max()))
+    return CameraFacts(camera.name, camera.extra, most)
 
 
 def environment_facts(scene: Scene) -> TextureDesc | None:

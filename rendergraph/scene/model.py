@@ -27,6 +27,7 @@ from rendergraph.scene.edges import Edges, find_edges, is_solid
 from rendergraph.stamps import Stamps
 
 if TYPE_CHECKING:
+    from rendergraph.scene.curves import Curve
     from rendergraph.scene.rig import Deform, Pose, Rig
 
 Floats: TypeAlias = npt.NDArray[np.float32]
@@ -399,7 +400,8 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
 
     Attributes:
         cameras: by name, the first is the default.
-        keyframes: dotted path to times in seconds and values, linear between, held outside.
+        keyframes: dotted path to values over time.
+        follows: by camera the indices of the objects that it looks at.
         warnings: what a reader left out, replaced or clamped, once for each kind and file.
         recipe: section and name (`("cameras", "main")`) to the values in the scene file, which keyframes change.
         placements: name of a scene file's object, or of one copy of it, to its parts; "" for all of an animated file.
@@ -419,7 +421,7 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
     lights: tuple[Light, ...] = ()
     cameras: Mapping[str, Camera] = field(default_factory=dict)
     environment: Environment | None = None
-    keyframes: Mapping[str, tuple[tuple[float, Any], ...]] = field(default_factory=dict)
+    keyframes: Mapping[str, Curve] = field(default_factory=dict)
     orbit: Orbit | None = None
     warnings: tuple[Any, ...] = ()
     recipe: Mapping[tuple[str, str], Mapping[str, Any]] = field(default_factory=dict)
@@ -427,6 +429,7 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
     copies: Mapping[tuple[str, str], Any] = field(default_factory=dict)
     plugin_keys: Mapping[str, frozenset[str]] = field(default_factory=dict)
     rigs: tuple[Rig, ...] = ()
+    follows: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     files: Stamps = field(default_factory=dict)
     ground: float | None = None
 
@@ -452,6 +455,26 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         low, high = extremes(np.concatenate([center - extent, center + extent]))
         (x, y, z), (u, v, w) = low.tolist(), high.tolist()
         return (x, y, z), (u, v, w)
+
+    @cached_property
+    def tracks(self) -> tuple[tuple[str, str, tuple[tuple[str, Curve], ...]], ...]:
+        """The keyframes by section and entry: those of one entry, each with its key."""
+        found: dict[tuple[str, str], list[tuple[str, Curve]]] = {}
+        for path, curve in self.keyframes.items():
+            section, _, rest = path.partition(".")
+            name, key = ("", rest) if section == "environment" else rest.rpartition(".")[::2]
+            found.setdefault((section, name), []).append(("rotation" if curve.turns else key, curve))
+        return tuple((section, name, tuple(curves)) for (section, name), curves in found.items() if section != "nodes")
+
+    @cached_property
+    def node_curves(self) -> tuple[tuple[str, str, Curve], ...]:
+        """The keyframes of nodes' parameters: node, parameter and values."""
+        paths = ((path.removeprefix("nodes.").rpartition("."), curve) for path, curve in self.keyframes.items())
+        return tuple(
+            (node, name, curve)
+            for ((node, _, name), curve), path in zip(paths, self.keyframes, strict=True)
+            if path.startswith("nodes.")
+        )
 
     @property
     def camera(self) -> Camera | None:

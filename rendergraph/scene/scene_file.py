@@ -24,6 +24,7 @@ from rendergraph.keys import Key, MapOf, Validator, plain
 from rendergraph.keys.values import FILE
 from rendergraph.resources import is_name, shipped_scenes
 from rendergraph.scene import animate, scene_keys, scene_values
+from rendergraph.scene.curves import Curve, quaternion
 from rendergraph.scene.environments import SKIES, named
 from rendergraph.scene.geometry import rigid
 from rendergraph.scene.mesh_files import MESHES, read_mesh
@@ -162,7 +163,7 @@ class _Reader:
         for name, entry in _entries(top, "objects").items():
             self._object(name, entry, names["materials"])
         environment = self._environment(top.get("environment"))
-        return Scene(
+        scene = Scene(
             self.path.stem,
             self.path,
             tuple(self.objects),
@@ -179,7 +180,19 @@ class _Reader:
             plugin_keys=self.plugin_keys,
             rigs=tuple(self.rigs),
             ground=self.ground,
+            follows=self._follows(top),
         )
+        return animate.following(scene, {}) if scene.follows and not self.validator.problems else scene
+
+    def _follows(self, top: Value) -> dict[str, tuple[int, ...]]:
+        """By camera the objects that it follows: a name under `objects`, or that of a copy."""
+        found = {}
+        for name, entry in _entries(top, "cameras").items():
+            self._check_name(entry, "follow", self.placements, "objects")
+            placement = self.placements.get(str(self.recipe["cameras", name].get("follow")))
+            if placement is not None:
+                found[name] = tuple(index for index, _ in placement.objects)
+        return found
 
     def _add_plugin_keys(self, root: Value) -> None:
         """Ask the plugins if the file has keys that are not rendergraph's own."""
@@ -318,8 +331,10 @@ class _Reader:
 
     def _camera(self, name: str, entry: Value) -> None:
         self.recipe["cameras", name] = values = self._plain("cameras", entry)
+        eye = values.get("eye", (0.0, 0.0, 5.0))
+        ahead: Any = tuple(np.add(eye, (0, 0, -1)).tolist()) if "follow" in values else None  # until objects are read
         try:
-            self.cameras[name] = scene_values.camera(name, values)
+            self.cameras[name] = scene_values.camera(name, values, ahead)
         except ValueError as problem:
             self.validator.report(entry, "RG321", f"camera '{shown(name)}': {problem}", key=True)
             self.cameras[name] = scene_values.camera(name, {})
@@ -544,7 +559,7 @@ class _Reader:
             node: self._split("objects", entry, plain(entry, override[0].type.of)) for node, entry in entries.items()
         }
 
-    def _keyframes(self, top: Value, names: dict[str, tuple[str, ...]]) -> dict[str, tuple[tuple[float, Any], ...]]:
+    def _keyframes(self, top: Value, names: dict[str, tuple[str, ...]]) -> dict[str, Curve]:
         result = {}
         for path, entry in _entries(top, "keyframes").items():
             key = self._named_key(str(path), entry, names)
@@ -556,26 +571,53 @@ class _Reader:
                 self.validator.report(entry, "RG321", text)
                 continue
             frames = []
+            words: dict[str, Any] = {}
             for time, value in entry.items():
+                if time in ("ease", "slerp"):
+                    word = scene_keys.EASE if time == "ease" else scene_keys.SLERP
+                    if (good := self.validator.value(value, word)) is not None:
+                        words[time] = plain(good, word.type)
+                    continue
                 if isinstance(time, bool) or not isinstance(time, int | float) or not math.isfinite(time):
-                    text = f"keyframes of '{shown(path)}': '{shown(time)}' is not a time in seconds"
+                    text = f"keyframes of '{shown(path)}': '{shown(time)}' is not a time in seconds, `ease` or `slerp`"
                     self.validator.report(value, "RG321", text, key=True)
                     continue
                 if value.data is None:
                     self.validator.report(value, "RG321", f"keyframe {time:g} s of '{shown(path)}' has no value")
                 elif (good := self.validator.value(value, key)) is not None:
                     frames.append((float(time), plain(good, key.type)))
-            result[path] = tuple(sorted(frames, key=lambda frame: frame[0]))
+            if curve := self._curve(path, entry, sorted(frames, key=lambda frame: frame[0]), words):
+                result[path] = curve
         return result
+
+    def _curve(
+        self, path: str, entry: Value, frames: list[tuple[float, Any]], words: Mapping[str, Any]
+    ) -> Curve | None:
+        """The values over time; None after a mistake."""
+        turns = words.get("slerp", False)
+        if turns and not (path.startswith("objects.") and path.endswith(".rotate_degrees")):
+            text = f"keyframes of '{shown(path)}': 'slerp' is for the 'rotate_degrees' of objects"
+            self.validator.report(_value(entry, "slerp"), "RG321", text, key=True)
+        elif len({np.shape(value) for _, value in frames}) > 1:
+            self.validator.report(entry, "RG321", f"keyframes of '{shown(path)}' are of different lengths")
+        elif frames:
+            values = [quaternion(np.array(value)) if turns else value for _, value in frames]
+            times = np.array([time for time, _ in frames])
+            return Curve(times, np.array(values, np.float64), words.get("ease", "linear"), turns, entry.key_place)
+        elif all(time in ("ease", "slerp") for time, _ in entry.items()):
+            self.validator.report(entry, "RG321", f"keyframes of '{shown(path)}' have no times")
+        return None
 
     def _named_key(self, path: str, entry: Value, names: dict[str, tuple[str, ...]]) -> Key | None:
         """The key that a dotted path names; only numbers, vectors and colours can be animated."""
         section, _, rest = path.partition(".")
         name, key = ("", rest) if section == "environment" else rest.rpartition(".")[::2]
+        if section == "nodes" and name and key:  # whether the pipeline has it is another question
+            return scene_keys.NODE_VALUE
         known = names.get(section, ())
         moving: dict[str, Key] = {}
         if section not in scene_keys.SECTIONS:
-            hint = suggestion(section, scene_keys.SECTIONS)
+            hint = suggestion(section, (*scene_keys.SECTIONS, "nodes"))
             text = f"keyframes: there is no section '{shown(section)}'{hint}"
         elif section != "environment" and name not in known:
             hint = suggestion(name, known) or f"; there are no {section}"

@@ -242,6 +242,7 @@ CAMERA = Table(
     (
         Key("eye", vector(), "Where it is.", (0.0, 0.0, 5.0), "m"),
         Key("target", vector(), "What it looks at.", (0.0, 0.0, 0.0), "m"),
+        Key("follow", NAME, "Name of an object that it looks at, wherever that moves, in place of a target."),
         Key("up", vector(), f"What is up in the picture; {_DIRECTION}.", (0.0, 1.0, 0.0)),
         Key("fov_y_degrees", number(0.01, 179), "Vertical angle of a perspective camera.", 45.0, "°"),
         Key("height", LENGTH, "Height of what an orthographic camera sees; makes it orthographic.", None, "m"),
@@ -335,13 +336,23 @@ def with_plugins(
     return found
 
 
+NODE_VALUE = Key("value", number() | listed(number(), "numbers", 1), "Of a node's parameter.")
+EASE = Key("ease", choice("linear", "smooth", "step"), "Between two keys: `smooth` starts and ends at rest.", "linear")
+SLERP = Key("slerp", bool, "Turn the shorter way from key to key, about one axis (`rotate_degrees`).", False)
+
+
+def _curve(type: Any) -> Schema:
+    more = {key.name: {**schema(key.type), "description": key.doc} for key in (EASE, SLERP)}
+    return {"type": "object", "minProperties": 1, "properties": more, "additionalProperties": schema(type)}
+
+
 def _keyframes(sections: Mapping[str, Table]) -> Schema:
     found = {}
     for section, table in sections.items():
         name = "" if section == "environment" else r"\..+"
         for key in moving(table).values():
-            frames = {"type": "object", "minProperties": 1, "additionalProperties": schema(key.type)}
-            found[rf"^{section}{name}\.{key.name}$"] = {**frames, "description": key.doc}
+            found[rf"^{section}{name}\.{key.name}$"] = _curve(key.type) | {"description": key.doc}
+    found[r"^nodes\..+\..+$"] = _curve(NODE_VALUE.type) | {"description": "A parameter of a node that is a uniform."}
     return {"type": "object", "patternProperties": found, "additionalProperties": False}
 
 
@@ -374,7 +385,8 @@ def scene_table(sections: Mapping[str, Table] = SECTIONS) -> Table:
             Key(
                 "keyframes",
                 keyframes,
-                "Dotted path (`cameras.main.eye`) to seconds and values, linear between, held outside.",
+                "Dotted path (`cameras.main.eye`, `nodes.bloom.intensity`) to seconds and values, held outside; beside "
+                "them `ease: smooth` or `step`, and `slerp: true` for `rotate_degrees`.",
             ),
             Key("orbit", ORBIT, "A camera that turns about its target."),
         ),

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from rendergraph.facts import NO_EXTRA
 from rendergraph.projection import look_at, unit
 from rendergraph.scene.geometry import euler_matrix, placement, vec3
-from rendergraph.scene.model import Camera, Light, Material, Matrix, Texture
+from rendergraph.scene.model import Camera, Light, Material, Matrix, Texture, Vec3
 
 _PLAIN = frozenset(Material.__struct_fields__) - {"name", "emissive", "textures"}
 """Fields of a material that are values as a scene file has them; `extra` holds those of plugins' keys."""
@@ -49,8 +49,8 @@ def light(name: str, values: Mapping[str, Any]) -> Light:
     )
 
 
-def camera(name: str, values: Mapping[str, Any]) -> Camera:
-    """Return a camera; a mistake is a ValueError."""
+def camera(name: str, values: Mapping[str, Any], followed: Vec3 | None = None) -> Camera:
+    """Return a camera, which looks at `followed` if it follows an object; a mistake is a ValueError."""
     near, far = values.get("near", 0.05), values.get("far", 100.0)
     if near >= far:
         raise ValueError(f"'near' ({near:g}) must be below 'far' ({far:g})")
@@ -63,7 +63,9 @@ def camera(name: str, values: Mapping[str, Any]) -> Camera:
         values["frustum"][0] < values["frustum"][1] and values["frustum"][2] < values["frustum"][3]
     ):
         raise ValueError("'frustum' must be left < right, bottom < top")
-    target = values.get("target", (0.0, 0.0, 0.0))
+    if "follow" in values and "target" in values:
+        raise ValueError("has both 'follow' and 'target'; choose one")
+    target = followed or values.get("target", (0.0, 0.0, 0.0))
     transform = look_at(values.get("eye", (0.0, 0.0, 5.0)), target, values.get("up", (0.0, 1.0, 0.0)))
     kind: Literal["perspective", "orthographic", "frustum"] = (
         "orthographic" if "height" in values else "frustum" if "frustum" in values else "perspective"
@@ -85,7 +87,9 @@ def camera(name: str, values: Mapping[str, Any]) -> Camera:
 
 def placed(values: Mapping[str, Any]) -> Matrix:
     """Return the transform of an object: scaled, turned, moved."""
-    rotation = euler_matrix(values.get("rotate_degrees", (0.0, 0.0, 0.0)))
+    rotation = values.get("rotation")
+    if rotation is None:
+        rotation = euler_matrix(values.get("rotate_degrees", (0.0, 0.0, 0.0)))
     return placement(values.get("at", (0.0, 0.0, 0.0)), rotation, values.get("scale", (1.0, 1.0, 1.0)))
 
 

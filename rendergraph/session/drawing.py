@@ -19,6 +19,7 @@ from rendergraph.program import ray_warnings
 from rendergraph.scene import animate
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import Camera, Scene
+from rendergraph.session.driven import Driven
 from rendergraph.session.frame import Frame, OutputInfo
 from rendergraph.session.gpu import Gpu
 from rendergraph.session.picture_metadata import frame_metadata, pipeline_metadata
@@ -50,6 +51,9 @@ class Drawing(Struct, eq=False, dict=True):
 
     def __post_init__(self) -> None:
         options = self.expanded.options
+        linked = self.expanded.linked
+        drives = bool(linked.scene.node_curves)
+        self._driven = Driven(linked.graph, linked.scene, self.executable) if drives else None
         self.runner = Runner(self.executable, self.expanded.linked.graph, options.reuses, options.cull)
         history = any(r.role == "history" for r in self.executable.plan.resources.values())
         self._remembers = history or self.executable.uses_previous
@@ -107,6 +111,8 @@ class Drawing(Struct, eq=False, dict=True):
             self.camera = camera or scene.camera
             assert self.camera is not None  # a completed scene has one
             view = view_matrices(self.camera, linked.graph.size)
+            if self._driven is not None:
+                self._driven.set(self.executable, moment)
             begun = perf_counter()
             with activity.limited_draw():
                 options: dict[str, Any] = {"moment": part, "moments": len(each), "timed": self.expanded.options.timed}

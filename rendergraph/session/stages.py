@@ -30,6 +30,7 @@ from rendergraph.scene.animate import complete
 from rendergraph.scene.facts import camera_facts, environment_facts, light_facts, material_facts, object_facts
 from rendergraph.scene.model import Scene
 from rendergraph.scene.scene_data import scene_data_facts
+from rendergraph.session import driven
 from rendergraph.session.films import on_turntable
 from rendergraph.session.outputs import every_port, requested_outputs
 from rendergraph.session.picture_metadata import PictureMetadata, is_picture, read_picture_metadata
@@ -115,6 +116,8 @@ def link(resolved: Resolved) -> Linked:
         material_facts(scene),
         camera_facts(scene),
     )
+    if scene.node_curves:
+        graph = replace(graph, warnings=(*graph.warnings, *driven.checked(graph, scene)))
     return Linked(**asdict(resolved), scene=scene, graph=graph)
 
 

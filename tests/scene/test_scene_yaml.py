@@ -65,7 +65,7 @@ def test_the_example_of_the_design(folder: Path) -> None:
     assert scene.cameras["main"].fov_y == math.radians(45)
     assert scene.environment is not None
     assert str(scene.environment.image.label) == "sky.hdr"
-    assert scene.keyframes["cameras.main.eye"][1] == (2.0, (2, 1.5, 3.5))
+    assert scene.keyframes["cameras.main.eye"].at(2.0) == (2, 1.5, 3.5)
     assert scene.orbit is not None
     assert scene.orbit.degrees_per_second == 30
 
