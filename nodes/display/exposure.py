@@ -72,6 +72,7 @@ class Exposure(Node):
     compensation: float = param(
         default=0.0, unit="EV", min=-16, max=16, doc="Stops added at the end, as a photographer does for snow."
     )
+    transparent: bool = define(default=False, doc="Meter only what surfaces cover: nothing is behind them.")
     start: float = param(default=0.0, min=0, doc="Adapted luminance in the first frame; 0: that of the picture.")
     seconds_to_light: float = param(
         default=0.4, unit="s", min=0, max=600, doc="Time constant towards brighter pictures; 0: at once."

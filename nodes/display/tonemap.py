@@ -115,6 +115,9 @@ class Tonemap(Node):
         default=None, doc="A colour table (`.cube` and others) or a configuration of OpenColorIO (`.ocio`)."
     )
     look_name: str = structural(default="", doc="The look of a configuration; by default its first.")
+    transparent: bool = define(
+        default=False, doc="Keep alpha; colours are multiplied by it, so that filters of the picture do not mix them."
+    )
     white: float = param(
         default=4.0,
         min=0.01,

@@ -237,6 +237,7 @@ class Lighting(Node):
             objects = [one.name for one in steps.facts.objects if one.blended and not one.hidden and not transmits(one)]
             self.copy_behind(steps, out["radiance"])
             behind: dict[str, Any] = reads | {"behind": self.behind.sampled("trilinear")}
+            transparent = {"TRANSPARENT": 1} if getattr(self, "transparent", False) else {}
             if self.environment_reads(steps):
                 behind["brdf_table"] = self.brdf_table.sampled("linear")
             steps.geometry(
@@ -247,7 +248,7 @@ class Lighting(Node):
                 out=out,
                 objects=through,
                 view=view,
-                defines={"TRANSMITS": 1},
+                defines={"TRANSMITS": 1, **transparent},
                 label="transmissive",
                 **behind,
             )
@@ -350,6 +351,10 @@ class SurfaceLighting(Lighting):
         max=1,
         doc="Blur of the backdrop: the roughness of a surface that would reflect it so.",
     )
+    transparent: bool = structural(
+        default=False,
+        doc="Leave out what is behind all surfaces, and let alpha say how much they cover, glass in part.",
+    )
     blended: bool = structural(
         default=True, doc="Draw transparent surfaces, too; otherwise a `forward_transparent` can draw them."
     )
@@ -421,7 +426,13 @@ def shows_environment(node: SurfaceLighting, facts: Facts) -> bool:
     """Return whether the environment is the background: one is connected, and no other background is set."""
     background = getattr(node, "background", 0.0)
     plain = any(background) if isinstance(background, tuple) else background
-    return not plain and node.backdrop and facts.connected("environment") and node.terms in ("all", "ambient")
+    return (
+        not plain
+        and node.backdrop
+        and not node.transparent
+        and facts.connected("environment")
+        and node.terms in ("all", "ambient")
+    )
 
 
 def draws_backdrop(node: SurfaceLighting, facts: Facts) -> bool:

@@ -141,6 +141,9 @@ class PathTraced(Node):
     backdrop: bool = structural(
         default=True, doc="Show the environment behind all surfaces; otherwise there is the `background`."
     )
+    transparent: bool = structural(
+        default=False, doc="Leave out what is behind all surfaces, and let alpha say how much they cover."
+    )
     samples: int = structural(default=16, min=1, max=65536, unit="paths", doc="Paths of a pixel in each frame.")
     max_bounces: int = define(
         default=4,
@@ -184,7 +187,7 @@ class PathTraced(Node):
         if steps.connected(self.environment):
             reads |= {"environment": self.environment, "environment_table": self.environment_table}
             reads["environment_tree"] = self.environment_tree
-            if self.backdrop and self.sources in ("all", "environment"):
+            if self.backdrop and not self.transparent and self.sources in ("all", "environment"):
                 defines["SHOWS_ENVIRONMENT"] = 1
             steps.fullscreen(
                 "environment_table.frag",

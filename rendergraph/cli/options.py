@@ -275,6 +275,11 @@ SELECTION_OPTIONS = {
     "ground": click.option(
         "--ground", is_flag=True, help="Put a ground below the scene that shows the environment and receives shadows."
     ),
+    "transparent": click.option(
+        "--transparent",
+        is_flag=True,
+        help="Leave out the background and write alpha, straight in PNG and premultiplied in EXR.",
+    ),
     "size": click.option("--size", type=SIZE, metavar="WxH", help="Size of the picture in pixels."),
     "sets": click.option(
         "-s",

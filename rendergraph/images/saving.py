@@ -29,6 +29,8 @@ class TexelInfo(Protocol):
     def format(self) -> str: ...
     @property
     def encoding(self) -> str | None: ...
+    @property
+    def transparent(self) -> bool: ...
 
 
 class PictureInfo(Struct, frozen=True):
@@ -43,6 +45,7 @@ class PictureInfo(Struct, frozen=True):
     semantic: str = "any"
     format: str = ""
     encoding: str | None = None
+    transparent: bool = False
 
 
 def channel_names(info: TexelInfo, count: int) -> tuple[str, ...]:
@@ -91,6 +94,10 @@ def encoded(file: Saved, metadata: Mapping[str, str]) -> bytes:
 
 def _job(file: Saved) -> Job:
     path, pixels, info, raw = file
+    if info.transparent and extension(path) == ".png" and pixels.dtype == np.uint8 and pixels.shape[-1] == 4:
+        alpha = np.maximum(pixels[..., 3:].astype(np.uint32), 1)
+        straight = np.minimum((pixels[..., :3].astype(np.uint32) * 255 + alpha // 2) // alpha, 255).astype(np.uint8)
+        return path, np.concatenate([straight, pixels[..., 3:]], axis=-1), None, "data", False
     if EXTENSIONS[extension(path)] in ("png", "jpeg"):
         return path, viewable_as(pixels, info), None, "data", False
     pixels = _numbers(pixels, info)

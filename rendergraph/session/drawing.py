@@ -8,6 +8,7 @@ from time import perf_counter
 from typing import Any
 
 from msgspec import Struct, field
+from msgspec.structs import replace
 
 from rendergraph import activity
 from rendergraph.compile import Executable, GpuScene
@@ -156,10 +157,10 @@ class Drawing(Struct, eq=False, dict=True):
         graph = linked.graph
         resources = plan.schedule.outputs
         infos = {}
+        transparent = any(getattr(node.node, "transparent", False) is True for node in graph.nodes)
         for name, port in self.expanded.requests.items():
-            infos[name] = _output_info(
-                name, port, graph.textures[port.end].semantic, plan.resources[resources[name]].desc
-            )
+            info = _output_info(name, port, graph.textures[port.end].semantic, plan.resources[resources[name]].desc)
+            infos[name] = replace(info, transparent=transparent and info.semantic == "display_color")
         return Frame(
             number=self.number,
             pipeline=graph.name,

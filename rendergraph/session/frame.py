@@ -29,6 +29,7 @@ class OutputInfo(Struct, frozen=True):
         kind: a texture kind or `buffer`.
         encoding: `linear`, `display` or None.
         channels: channel names, as in an EXR file.
+        transparent: whether alpha belongs to a display colour, which is multiplied by it.
     """
 
     name: str
@@ -38,6 +39,7 @@ class OutputInfo(Struct, frozen=True):
     kind: str
     encoding: str | None
     channels: tuple[str, ...]
+    transparent: bool = False
 
 
 def not_finite(pixels: npt.NDArray[Any], semantic: str) -> int:

@@ -36,6 +36,7 @@ def load(
     scene: str | Path | Mapping[str, Any] | None = None,
     environment: str | Path | npt.NDArray[Any] | None = None,
     ground: bool = False,
+    transparent: bool = False,
     camera: str | None = None,
     size: tuple[int, int] | None = None,
     sets: Sequence[str] = (),
@@ -55,6 +56,7 @@ def load(
         Selection(
             source=source if isinstance(source, Mapping) else str(source),
             ground=ground,
+            transparent=transparent,
             camera=camera,
             size=size,
             sets=each_of(sets),

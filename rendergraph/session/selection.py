@@ -38,6 +38,7 @@ class Selection(Struct, frozen=True):
         scene, size: override the file's; `size` is width and height in pixels.
         environment: an equirectangular image that replaces the scene's.
         ground: whether a ground is put below the scene's objects, also where its file asks for none.
+        transparent: whether to set the parameter `transparent` of every node that has one: pictures get alpha.
         camera: name of the scene's camera; its first by default.
         shutter: overrides the cameras': how much of a frame's time it is open, 0 to 1.
         sets: values of `-s`, such as `ao.radius=0.8`.
@@ -54,6 +55,7 @@ class Selection(Struct, frozen=True):
     shutter: float | None = None
     environment: Path | None = None
     ground: bool = False
+    transparent: bool = False
     size: tuple[int, int] | None = None
     sets: tuple[str, ...] = ()
     patches: tuple[Path | Mapping[str, Any], ...] = ()

@@ -25,7 +25,8 @@ import rendergraph.resolve
 import rendergraph.schedule
 from rendergraph.catalog import Catalog
 from rendergraph.document import Document, YamlLimits
-from rendergraph.errors import InputError, Option, Place, Problem, RendergraphError
+from rendergraph.errors import InputError, Option, Place, Problem, RendergraphError, UsageError
+from rendergraph.resolve import PipelineSpec
 from rendergraph.scene.animate import complete
 from rendergraph.scene.facts import camera_facts, environment_facts, light_facts, material_facts, object_facts
 from rendergraph.scene.model import Scene
@@ -74,21 +75,37 @@ def resolve(selection: Selection, catalog: Catalog | None = None, document: Docu
             environment=selection.environment or _environment(selection, picture),
             ground=selection.ground or picture.ground,
         )
-    spec = rendergraph.resolve.resolve(
+    resolve_with = partial(
+        rendergraph.resolve.resolve,
         source,
         patches=selection.patches,
-        sets=selection.sets,
         scene=selection.scene,
         size=selection.size,
         asset_roots=selection.asset_roots,
         limits=limits,
         catalog=catalog,
     )
+    spec = resolve_with(sets=selection.sets)
+    if selection.transparent:
+        spec = resolve_with(sets=(*selection.sets, *_transparent(spec)))
     if spec.tree.get("rendergraph") is None:
         text = "missing format version: add `rendergraph: 1` as the first line"
         note = spec.tree.problem("RG016", text).as_warning()
         spec = replace(spec, notes=(*spec.notes, note))
     return Resolved(selection=selection, catalog=catalog, spec=spec, frames=frames, fps=fps)
+
+
+def _transparent(spec: PipelineSpec) -> list[str]:
+    """Return the settings that let nodes keep alpha."""
+    catalog = spec.catalog
+    assert catalog is not None  # `resolve` was given one
+    nodes = [node for node in spec.nodes.values() if node.type in catalog]
+    found = [
+        f"{node.id}.transparent=true" for node in nodes if "transparent" in catalog.get(node.type).cls.parameters()
+    ]
+    if not found:
+        raise UsageError(Problem("RG500", "--transparent: no node of the pipeline has a parameter 'transparent'"))
+    return found
 
 
 def _environment(selection: Selection, picture: PictureMetadata) -> Path | None:

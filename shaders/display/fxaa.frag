@@ -10,7 +10,7 @@ doc: |
 inputs:
   source: {semantic: display_color, filter: linear, doc: "The finished picture, display-referred."}
 outputs:
-  color: {semantic: display_color, like: source, doc: "The picture with smooth edges; alpha unchanged."}
+  color: {semantic: display_color, like: source, doc: "The picture with smooth edges, in alpha, too."}
 params:
   contrast: {default: 0.125, min: 0, max: 1, doc: "Least difference at an edge, relative to the brightest neighbour."}
   darkest: {default: 0.03125, min: 0, max: 1, doc: "Least difference of luma at an edge in dark regions."}
@@ -85,5 +85,5 @@ void main() {
     float subpixel = smoothstep(0.0, 1.0, clamp(abs(mean - center) / range, 0.0, 1.0));
     offset = max(offset, subpixel * subpixel * softness);
     vec2 uv = (vec2(texel) + 0.5 + vec2(normal) * offset) / vec2(textureSize(source, 0));
-    color.rgb = texture(source, uv).rgb;
+    color = texture(source, uv);
 }

@@ -29,7 +29,8 @@ vec3 through_table(vec3 color) {
                              : (f.g >= f.b ? ivec3(0, 1, 0) : ivec3(0, 0, 1));
     ivec3 final = f.r < f.g ? (f.r < f.b ? ivec3(1, 0, 0) : ivec3(0, 0, 1))
                             : (f.g < f.b ? ivec3(0, 1, 0) : ivec3(0, 0, 1));
-    float greatest = max(max(f.r, f.g), f.b), least = min(min(f.r, f.g), f.b), middle = f.r + f.g + f.b - greatest - least;
+    float greatest = max(max(f.r, f.g), f.b), least = min(min(f.r, f.g), f.b);
+    float middle = f.r + f.g + f.b - greatest - least;
     vec3 sum = texelFetch(look_table, lower, 0).rgb * (1.0 - greatest);
     sum += texelFetch(look_table, lower + first, 0).rgb * (greatest - middle);
     sum += texelFetch(look_table, lower + 1 - final, 0).rgb * (middle - least);

@@ -13,7 +13,7 @@ shared uint counts[BINS];
 uint weight_of(ivec2 texel, ivec2 size, float alpha) {
     vec2 place = (vec2(texel) + 0.5) / vec2(size) * 2.0 - 1.0;  // -1 to 1
     float weight = mix(1.0, exp(-2.0 * dot(place, place)), center_weight);
-#if METER == METER_COVERED
+#if METER == METER_COVERED || TRANSPARENT
     weight *= clamp(alpha, 0.0, 1.0);
 #endif
     return uint(15.0 * weight + 0.5);

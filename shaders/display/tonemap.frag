@@ -45,20 +45,41 @@ void main() {
     scale *= texelFetch(gain, ivec2(0), 0).r;
 #endif
     vec3 sum = vec3(0.0);
+#if TRANSPARENT
+    float covered = 0.0;
+#endif
     bool broken = false;
     for (int i = 0; i < RADIANCE_SAMPLES; ++i) {
+#if TRANSPARENT
+        vec4 texel = texelFetch(radiance, ivec2(gl_FragCoord.xy), i);
+        float alpha = clamp(texel.a, 0.0, 1.0);
+        vec3 light = texel.rgb / max(alpha, 1e-4);
+        covered += alpha;
+#else
         vec3 light = texelFetch(radiance, ivec2(gl_FragCoord.xy), i).rgb;
+#endif
         broken = broken || any(isnan(light));
         vec3 scene = max(light, 0.0) * scale;
         scene = graded(min(scene, 1e9));
 #ifdef LOOK_LINEAR
         scene = linear_look(scene);
 #endif
+#if TRANSPARENT
+        sum += clamp(tone_curve(scene), 0.0, 1.0) * alpha;
+#else
         sum += clamp(tone_curve(scene), 0.0, 1.0);
+#endif
     }
+#if TRANSPARENT
+    color = vec4(linear_to_srgb(sum / max(covered, 1e-4)), covered / float(RADIANCE_SAMPLES));
+#else
     color = vec4(linear_to_srgb(sum / float(RADIANCE_SAMPLES)), 1.0);
+#endif
 #ifdef LOOK_DISPLAY
     color.rgb = clamp(through_table(color.rgb), 0.0, 1.0);
+#endif
+#if TRANSPARENT
+    color.rgb *= color.a;
 #endif
 #if DITHER
     color.rgb += (interleaved_gradient_noise(gl_FragCoord.xy) - 0.5) * (0.998 / 255.0);  // keeps exact 8-bit values

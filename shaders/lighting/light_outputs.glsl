@@ -101,6 +101,9 @@ void write_light(Surface s, ReflectedLight direct, ReflectedLight environment) {
 #ifdef WRITES_DIRECT_SPECULAR
     direct_specular = vec4(selected_specular(direct) * s.alpha, s.alpha);
 #endif
+#if defined(TRANSPARENT) && defined(TRANSMISSION_LAYER)
+    radiance.a *= transmitted_coverage(s);
+#endif
     // What is transparent dims the albedo of the opaque surface behind it, and leaves its other factors as they are.
 #ifdef WRITES_ENVIRONMENT_REFLECTION
     environment_reflection = vec4(min(occluded_reflection(s), MAX_HALF_FLOAT), 1.0);
