@@ -18,7 +18,7 @@ draw: Any = module_from_spec(SPEC)
 sys.modules["draw"] = draw  # where the classes in it look up their annotations
 SPEC.loader.exec_module(draw)
 LIST: Any = draw.read()
-FILES = {file.name for file in (DOCS / "images").iterdir() if file.suffix in (".png", ".svg")}
+FILES = {file.name for file in (DOCS / "images").iterdir() if file.suffix in (".png", ".jpg", ".svg")}
 NOT_CHECKED = {"--tap", "--frames", "--subframes", "-o"}  # what `check` has no such words for, each with one behind it
 
 CHECKED: set[tuple[str, ...]] = set()  # many a picture has the same first panel
@@ -32,7 +32,9 @@ def test_every_picture_is_listed_once_and_every_listed_one_is_there() -> None:
 def test_every_picture_is_shown_on_a_page() -> None:
     pages = [DOCS.parent / "README.md", *(page for page in DOCS.rglob("*.md") if "generated" not in page.parts)]
     shown = {
-        name for page in pages for name in re.findall(r"images/([\w-]+\.(?:png|svg))", page.read_text(encoding="utf-8"))
+        name
+        for page in pages
+        for name in re.findall(r"images/([\w-]+\.(?:png|jpg|svg))", page.read_text(encoding="utf-8"))
     }
     assert shown == FILES
 
@@ -101,3 +103,29 @@ def test_a_sheet_is_put_together_as_its_entry_says(tmp_path: Path, monkeypatch: 
     assert (shown[2] == 255).all()
     assert (shown[:, 2] == 255).all()
     assert abs(int(shown[4, 0]) - 188) <= 1  # half the light of white, sRGB encoded
+
+
+def test_a_layout_magnifies_and_measures(tmp_path: Path) -> None:
+    """Two grey panels: the frame and the inset of finer pixels, the error's colour for a known difference, JPEG."""
+    import numpy as np
+
+    from rendergraph import images
+
+    layout: Any = sys.modules["layout"]
+    panels = [np.full((40, 60, 3), shade, np.uint8) for shade in (100, 151)]  # 0.2 of white apart
+    details = [panel.repeat(2, 0).repeat(2, 1) for panel in panels]
+    details[1][30, 40] = (255, 0, 0)
+    plan = layout.Layout(2, gap=4, inset=(10, 10, 20, 10), reference=0, top=0.4)
+    sheet = layout.laid_out(panels, plan, details)
+    assert sheet.shape == (40 + 4 + 30 + 4 + 40, 60 + 4 + 60, 3)
+    assert sheet[8, 20].tolist() == [255, 196, 0]  # the frame around the part
+    assert sheet[44 + 1, 64 + 30].tolist() == [255, 196, 0]  # and around its enlargement
+    assert (sheet[44 + 2 : 44 + 28, 2:58] == 100).all()
+    assert 1 <= (sheet[44:74, 64:] == (255, 0, 0)).all(axis=-1).sum() <= 4  # one pixel of 1.5 by 1.5
+    half = layout.false_color(np.array(0.5))
+    assert np.abs(sheet[-2, 70].astype(int) - half).max() <= 1
+    layout.save(tmp_path / "a.jpg", sheet)
+    assert np.abs(images.read(tmp_path / "a.jpg").astype(int) - sheet).mean() < 6
+    labelled = layout.laid_out(panels[:1], layout.Layout(1, labels=("A",)))
+    assert labelled.max() > 200
+    assert labelled.min() < 90

@@ -15,7 +15,6 @@ import shutil
 import sys
 from base64 import b64decode
 from contextlib import chdir, redirect_stdout
-from functools import reduce
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -34,6 +33,9 @@ from rendergraph.resolve import merge_patch
 from rendergraph.resources import folder
 
 HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+from layout import Layout, laid_out, save  # noqa: E402  # beside this file
+
 DOCS = HERE.parent
 SHARED = Path(os.environ.get("RENDERGRAPH_SHARED", DOCS.parents[1] / "shared"))
 SCENES = folder("rendergraph.pipelines") / "scenes"
@@ -68,6 +70,10 @@ class Picture(Struct, frozen=True, forbid_unknown_fields=True):
         always: words that each panel's pipeline is followed by.
         columns: panels of a row; all are in one by default.
         gap: white pixels between panels.
+        labels: texts that are written into the panels.
+        inset: x, y, width and height of a part of every panel that is magnified below it, in pixels of what is shown.
+        reference: number of the panel, from 0, whose differences from the others are shown in false colour below them.
+        top: the difference, as a share of white, of the brightest of these colours.
         crop, enlarge, shrink: of panels that say nothing else.
         page: a page whose named blocks of code the commands find as files.
         files: further files: text, or a scene, whose `of` names a shipped one or one above that it is merged into.
@@ -80,6 +86,10 @@ class Picture(Struct, frozen=True, forbid_unknown_fields=True):
     always: str = ""
     columns: int = 0
     gap: int = 0
+    labels: tuple[str, ...] = ()
+    inset: tuple[int, int, int, int] | None = None
+    reference: int = -1
+    top: float = 0.25
     crop: tuple[int, int, int, int] | None = None
     enlarge: int = 1
     shrink: int = 1
@@ -88,6 +98,9 @@ class Picture(Struct, frozen=True, forbid_unknown_fields=True):
     program: str = ""
     measured: str = ""
     by_hand: str = ""
+
+
+UNSCALED = Picture()
 
 
 class List(Struct, frozen=True, forbid_unknown_fields=True):
@@ -160,7 +173,7 @@ def draw(name: str, picture: Picture, place: Path) -> Path:
             sys.argv = before
         return made
     prepare(picture, place)
-    panels = []
+    panels, details = [], []
     file, report = place / "panel.png", place / "report.html"
     for panel, lines in zip(picture.panels, commands(picture), strict=True):
         total: Any = 0
@@ -173,16 +186,20 @@ def draw(name: str, picture: Picture, place: Path) -> Path:
                 text = report.read_text(encoding="utf-8")
                 file.write_bytes(b64decode(re.findall(r'base64,([^"]+)" alt="FLIP', text)[-1]))
             total = total + images.read(file)[..., :3].astype(np.uint16)
-        panels.append(_shown(np.minimum(total, 255), Panel("") if isinstance(panel, str) else panel, picture))
+        asked = Panel(panel) if isinstance(panel, str) else panel
+        panels.append(_shown(np.minimum(total, 255), asked, picture))
+        is_whole = asked == Panel(asked.run) and picture.crop is None
+        details.append(_shown(np.minimum(total, 255), asked, UNSCALED) if is_whole else panels[-1])
     panel = picture.panels[0]
     asked = Panel(panel) if isinstance(panel, str) else panel
     untouched = asked == Panel(asked.run) and (picture.crop, picture.enlarge, picture.shrink) == (None, 1, 1)
-    if untouched and len(panels) == 1 and len(commands(picture)[0]) == 1:
+    is_one = len(panels) == 1 and len(commands(picture)[0]) == 1
+    if untouched and is_one and not picture.labels and name.endswith(".png"):
         shutil.copy(file, made)
         return made
     columns = picture.columns or len(panels)
-    rows = [_joined(panels[start : start + columns], picture.gap, 1) for start in range(0, len(panels), columns)]
-    images.write(made, _joined(rows, picture.gap, 0))
+    layout = Layout(columns, picture.gap, picture.labels, picture.inset, picture.reference, picture.top)
+    save(made, laid_out(panels, layout, details))
     return made
 
 
@@ -206,17 +223,6 @@ def _shown(pixels: Any, panel: Panel, picture: Picture) -> Bytes:
         pixels = pixels[y : y + height, x : x + width]
     pixels = np.broadcast_to(pixels, (*pixels.shape[:2], 3))  # grey ones, too
     return np.asarray(pixels.repeat(enlarge, 0).repeat(enlarge, 1), np.uint8)
-
-
-def _joined(parts: list[Bytes], gap: int, axis: int) -> Bytes:
-    """Pictures beside each other, or below, of one size across."""
-
-    def beside(a: Bytes, b: Bytes) -> Bytes:
-        shape = list(a.shape)
-        shape[axis] = gap
-        return np.concatenate([a, np.full(shape, 255, np.uint8), b], axis)
-
-    return reduce(beside, parts)
 
 
 def main() -> None:

@@ -83,7 +83,7 @@ def test_what_is_tested_against_a_pre_pass_has_its_samples(session: rg.Session) 
         "prepass": {"type": "depth_prepass", "params": {"samples": 4}},
         "light": {"inputs": {"depth": "prepass.depth"}},
     }
-    forward = rg.load("forward", sets=sets, size=(48, 32))
+    forward = rg.load("forward", scene="spheres", sets=sets, size=(48, 32))
     pipeline = forward.patch({"nodes": behind})
     differ = (shown(session, pipeline) != shown(session, forward.set("light.samples", 4))).any(axis=-1)
     assert differ.mean() < 0.01

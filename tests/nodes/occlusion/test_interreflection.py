@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy.typing as npt
 import pytest
 
 import rendergraph as rg
+from rendergraph.resources import shipped_scenes
 
 pytestmark = pytest.mark.slow  # pictures of many samples
 
@@ -281,11 +283,16 @@ def test_the_picture_has_what_is_sent_on(draw: Draw, technique: str) -> None:
 
 
 @pytest.mark.parametrize("technique", ["ssao-ssgi", "ssil"])
-def test_ambient_light_is_added_by_the_node_that_knows_the_occlusion(draw: Draw, technique: str) -> None:
+def test_ambient_light_is_added_by_the_node_that_knows_the_occlusion(
+    draw: Draw, tmp_path: Path, technique: str
+) -> None:
+    """Of stairs without textures, whose occlusion would count as well."""
+    stairs = tmp_path / "stairs.yaml"
+    stairs.write_text(re.sub(r"texture: \{[^}]*\}", "base_color: 0.5", shipped_scenes()["stairs"].read_text()))
     sets = ("gi.ambient=0.5", "light.terms=emissive")
     ports = {"all": "gi.radiance", "open": "gi.occlusion", "sent": "gi.reflected"}
-    found = draw(technique, "stairs", ports, *sets, size=(64, 48))
-    albedo = draw(technique, "stairs", {"albedo": "gbuffer.albedo"}, size=(64, 48))["albedo"] ** 2
+    found = draw(technique, stairs, ports, *sets, size=(64, 48))
+    albedo = draw(technique, stairs, {"albedo": "gbuffer.albedo"}, size=(64, 48))["albedo"] ** 2
     assert found["sent"].max() == 0
     assert found["open"][..., 0].min() < 0.7
     np.testing.assert_allclose(found["all"], 0.5 * albedo * found["open"][..., :1], rtol=3e-3, atol=1e-3)
