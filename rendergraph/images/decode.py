@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -13,13 +13,14 @@ import numpy.typing as npt
 from rendergraph.declare import Added
 from rendergraph.declare.extensions import ImageLoader
 from rendergraph.errors import InputError, Place, Problem, shown_file
-from rendergraph.images.encode import HALF_MAX, PREFIX
+from rendergraph.images.encode import HALF_MAX, PREFIX, REC709
 from rendergraph.images.viewable import from_srgb
 from rendergraph.scene.image_files import ImageError, ImageFile, open_image
 from rendergraph.scene.model import ImageSource, MadeImage, SceneLimits
 
 Pixels: TypeAlias = npt.NDArray[Any]
 Warn: TypeAlias = Callable[[Problem], None]
+_BRADFORD = np.array([(0.8951, 0.2664, -0.1614), (-0.7502, 1.7135, 0.0367), (0.0389, -0.0685, 1.0296)])
 
 
 def decode(source: ImageSource, *, srgb: bool, warn: Warn | None = None, limits: SceneLimits = SceneLimits()) -> Pixels:
@@ -28,7 +29,8 @@ def decode(source: ImageSource, *, srgb: bool, warn: Warn | None = None, limits:
     Grey becomes three equal channels and a missing alpha 1; alpha is not multiplied in. Integer images keep their
     encoding (`srgb` ones are uploaded to an sRGB format); images of more than 8 bits that are not sRGB become floats
     0…1. HDR and EXR values are linear light, whatever `srgb` says; NaN becomes 0 and what is beyond the largest half
-    float becomes 65504, with a warning that counts the pixels.
+    float becomes 65504, with a warning that counts the pixels. Colours (`srgb`) of an EXR file that states other
+    primaries are converted to Rec. 709.
     """
     if source.loader is not None:
         return _decode_by_plugin(source, source.loader, warn, limits)
@@ -37,7 +39,33 @@ def decode(source: ImageSource, *, srgb: bool, warn: Warn | None = None, limits:
         is_wide = image.spec.format.basesize() > 1
         kind = "half" if is_light or (is_wide and not srgb) else "uint8"
         pixels = _in_display_window(image, np.asarray(image.read(image.color_channels(), kind, limits)))
-    return _as_rgba(_finite(source, pixels, warn) if is_light else pixels)
+        primaries = image.spec.get("chromaticities") if srgb and image.kind == ".exr" else None
+    if not is_light:
+        return _as_rgba(pixels)
+    pixels = _finite(source, pixels, warn)
+    if primaries is not None and pixels.shape[-1] >= 3 and not np.allclose(primaries, REC709, atol=1e-3):
+        colors = pixels[..., :3].astype(np.float32) @ to_rec709(primaries).T.astype(np.float32)
+        pixels[..., :3] = np.clip(colors, 0, HALF_MAX)  # what lies outside of Rec. 709 is clipped
+    return _as_rgba(pixels)
+
+
+def to_rec709(primaries: Sequence[float]) -> npt.NDArray[np.float64]:
+    """Return the matrix (3, 3) to linear Rec. 709 from the colours of these primaries.
+
+    `primaries` are x and y of red, green, blue and white, as OpenEXR states them. White stays white, by a von Kries
+    adaptation in the cone space of Bradford (Lam 1985).
+    """
+    source, white = _to_xyz(primaries)
+    target, daylight = _to_xyz(REC709)
+    adapted = np.linalg.inv(_BRADFORD) @ np.diag(_BRADFORD @ daylight / (_BRADFORD @ white)) @ _BRADFORD
+    return np.asarray(np.linalg.inv(target) @ adapted @ source)
+
+
+def _to_xyz(primaries: Sequence[float]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Return the matrix from RGB to XYZ, and the XYZ of white with a Y of 1 (SMPTE RP 177, 1993)."""
+    x, y = np.array(primaries, np.float64).reshape(4, 2).T
+    columns = np.stack([x / y, np.ones(4), (1 - x - y) / y])
+    return columns[:, :3] * np.linalg.solve(columns[:, :3], columns[:, 3]), columns[:, 3]
 
 
 def decode_light(

@@ -25,6 +25,8 @@ Encoding: TypeAlias = Literal["linear", "display", "data"]
 EXTENSIONS: dict[str, str] = {".png": "png", ".jpg": "jpeg", ".jpeg": "jpeg", ".exr": "openexr", ".hdr": "hdr"}
 """Extension, in lower case, to OpenImageIO's name of the format."""
 HALF_MAX = 65504.0
+REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+"""Chromaticities x and y of red, green, blue and white (ITU-R BT.709), which EXR files of light state."""
 PREFIX = "rendergraph:"
 
 _NAMES = {1: ("Y",), 2: ("R", "G"), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
@@ -101,8 +103,9 @@ def _write_job(job: Job, part: Path, metadata: Mapping[str, str]) -> None:
         elif shaped.ndim == 4:
             names = tuple(f"{layer:03d}.{name}" for layer in range(len(shaped)) for name in names)
             shaped = np.moveaxis(shaped, 0, 2).reshape(*shaped.shape[1:3], -1)
+    is_light = encoding != "data"
     try:
-        _write_file(path, part, shaped, names, kind, metadata)
+        _write_file(path, part, shaped, names, kind, metadata, is_light=is_light)
     except OSError as error:
         raise failed(path, error.strerror or str(error)) from error
 
@@ -143,7 +146,14 @@ def _error(path: Path, reason: str) -> InputError:
 
 
 def _write_file(
-    path: Path, part: Path, pixels: Pixels, names: Sequence[str] | None, kind: str, metadata: Mapping[str, str]
+    path: Path,
+    part: Path,
+    pixels: Pixels,
+    names: Sequence[str] | None,
+    kind: str,
+    metadata: Mapping[str, str],
+    *,
+    is_light: bool,
 ) -> None:
     texts = {key if key.startswith(PREFIX) else PREFIX + key: text for key, text in metadata.items()}
     if kind == "uint8" and path.suffix.lower() == ".png":
@@ -159,6 +169,8 @@ def _write_file(
     if path.suffix.lower() == ".exr":
         spec.attribute("compression", "zip")
         spec.attribute("DateTime", _NO_DATE)
+        if is_light and names and "R" in names[0]:
+            spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), REC709)
     elif EXTENSIONS[path.suffix.lower()] == "jpeg":
         spec.attribute("Compression", "jpeg:95")
         spec.attribute("jpeg:subsampling", "4:4:4")

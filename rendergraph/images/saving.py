@@ -104,7 +104,13 @@ def _job(file: Saved) -> Job:
     shaped = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
     decoded = not raw and info.encoding == "display"
     half = decoded or info.format in _HALF_FORMATS or pixels.dtype == np.float16
-    return path, shaped, channel_names(info, shaped.shape[-1]), "display" if decoded else "data", half
+    return (
+        path,
+        shaped,
+        channel_names(info, shaped.shape[-1]),
+        "display" if decoded else "linear" if info.encoding == "linear" else "data",
+        half,
+    )
 
 
 def viewable_as(pixels: Pixels, info: TexelInfo) -> Bytes:
