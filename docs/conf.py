@@ -15,8 +15,10 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
 from _generate import generate  # noqa: E402  # found by the line above
+from docutils import nodes  # type: ignore[import-untyped]  # noqa: E402  # it has no types
 
 import rendergraph  # noqa: E402
+from rendergraph.reference.python import public_names  # noqa: E402
 
 project = "rendergraph"
 author = "The rendergraph authors"
@@ -88,8 +90,24 @@ def _link_generated(app: Sphinx, docname: str, source: list[str]) -> None:
     source[0] = re.sub(r"\]\((?:\.\./)+((?:rendergraph|nodes|pipelines|shaders/include)/[^)\s]*)\)", linked, text)
 
 
+def _index_python(app: Sphinx, doctree: nodes.document) -> None:
+    """Enter the headings of the Python reference into the inventory, so that other projects can link to them."""
+    page = app.env.docname.rpartition("/")[2]
+    if page not in ("python", "node-api"):
+        return
+    names, domain = public_names(), app.env.get_domain("py")
+    for section in doctree.findall(nodes.section):
+        title = section[0].astext()
+        if title.partition(".")[0] in names and section["ids"]:
+            own, member = names[title.partition(".")[0]], "." in title
+            kind = "method" if member else "class" if isinstance(own, type) else "function"
+            home = "rendergraph.api" if page == "node-api" else "rendergraph"
+            domain.note_object(f"{home}.{title}", kind, section["ids"][0])  # type: ignore[attr-defined]
+
+
 def setup(app: Sphinx) -> None:
     """Sphinx's hook."""
     app.add_config_value("pictures", True, "env", bool, "Draw the pictures of the reference, which takes minutes.")
     app.connect("config-inited", _generate)
     app.connect("source-read", _link_generated)
+    app.connect("doctree-read", _index_python)

@@ -23,6 +23,15 @@ import rendergraph.steps.frame
 import rendergraph.steps.model
 import rendergraph.steps.state
 import rendergraph.textures
+from rendergraph.reference.python import (
+    PUBLIC_ERRORS,
+    author_names,
+    member_of,
+    member_signature,
+    public_members,
+    public_names,
+    signature,
+)
 from rendergraph.textures import Semantic, Signature
 
 from .markdown import block, code, page, prose, table
@@ -48,28 +57,24 @@ FIRST = (
     "Facts",
 )
 
-_GIVEN = {"FrameScene": rendergraph.steps.frame.FrameScene, "Light": rendergraph.scene.model.Light}
-"""What an author meets and does not import."""
-
+USED_FIRST = ("load", "loads", "Pipeline", "Frame", "Session", "compare", "sweep", "Comparison", "Sweep", "Result")
 _WITH_WORDS = (rendergraph.ports, rendergraph.textures, rendergraph.steps.model, rendergraph.steps.state)
 
 
 def pages() -> Iterator[tuple[str, str]]:
     """A page for users, and two for authors of nodes."""
-    names = [(name, rendergraph) for name in ("load", "Pipeline", "Selection", "RenderOptions", "Session", "Frame")]
-    errors = ("RendergraphError", "InputError", "RenderError", "DeviceError", "UsageError", "Problem", "Place")
-    names += [(name, rendergraph.errors) for name in errors]
+    public = public_names()
+    ordered = [*dict.fromkeys((*USED_FIRST, *rendergraph.__all__, *PUBLIC_ERRORS))]
     yield (
         "python.md",
         page(
             "Python",
-            "The same words as on the command line: load, set, render. `import rendergraph as rg` gives the first "
-            "six; the exceptions are in `rendergraph.errors`.",
-            *(_entry(name, getattr(module, name)) for name, module in names),
+            "The same words as on the command line: load, set, render. `import rendergraph as rg` gives all of it but "
+            f"{', '.join(map(code, PUBLIC_ERRORS))}, which are in `rendergraph.errors`.",
+            *(_entry(name, public[name]) for name in ordered),
         ),
     )
-    own = {name: value for name, value in sorted(vars(rendergraph.api).items()) if name[0] != "_"}
-    members = {name: value for name, value in own.items() if not inspect.ismodule(value)} | _GIVEN
+    members = author_names()
     ordered = sorted(members, key=lambda name: (FIRST.index(name) if name in FIRST else len(FIRST), name))
     documented = [name for name in ordered if callable(members[name]) or inspect.isclass(members[name])]
     meanings = [(code(n), prose(v.doc)) for n, v in members.items() if isinstance(v, Semantic | Signature)]
@@ -116,64 +121,10 @@ def _entry(name: str, thing: Any) -> str:
     is_value = dataclasses.is_dataclass(thing) or issubclass(thing, msgspec.Struct)
     arguments = signature(thing) if is_value or "__init__" in vars(thing) else ""
     parts += [block(f"class {name}{arguments}" if arguments else f"class {name}: ...", "python"), _doc(thing)]
-    for member, value in _public_members(thing):
-        shown: Any = value.fget if isinstance(value, property) else getattr(value, "func", value)
-        shown = inspect.unwrap(getattr(shown, "__func__", shown))
-        kind = "" if isinstance(value, property) or hasattr(value, "func") else signature(shown, method=True)
-        parts += [f"### {name}.{member}", block(f"{member}{kind}", "python") if kind else "", _doc(shown)]
+    for member, value in public_members(thing):
+        text = member_signature(member, value)
+        parts += [f"### {name}.{member}", block(text, "python") if text != member else "", _doc(member_of(value))]
     return "\n\n".join(part for part in parts if part)
-
-
-def _public_members(cls: type) -> Iterator[tuple[str, Any]]:
-    """Documented methods and properties that the class defines, or a base that has no entry of its own."""
-    seen: set[str] = set()
-    for base in cls.__mro__:
-        if not base.__module__.startswith("rendergraph") or (
-            base is not cls and hasattr(rendergraph.api, base.__name__)
-        ):
-            continue
-        for name, value in vars(base).items():
-            shown: Any = value.fget if isinstance(value, property) else getattr(value, "func", value)
-            shown = inspect.unwrap(getattr(shown, "__func__", shown))
-            if not name.startswith("_") and name not in seen and inspect.isfunction(shown) and shown.__doc__:
-                seen.add(name)
-                yield name, value
-
-
-def signature(thing: Any, *, method: bool = False) -> str:
-    try:
-        found = inspect.signature(thing)
-    except (TypeError, ValueError):
-        return "(…)"
-    shown, keyword_only = [], False
-    # A struct's signature has its types worked out; the page shows them by the names that it explains.
-    is_struct = inspect.isclass(thing) and issubclass(thing, msgspec.Struct)
-    lines = [inspect.get_annotations(base) for base in reversed(thing.__mro__)] if is_struct else []
-    written = {name: text for line in lines for name, text in line.items()}
-    for parameter in found.parameters.values():
-        parameter = parameter.replace(annotation=written.get(parameter.name, parameter.annotation))
-        if method and parameter.name in ("self", "cls"):
-            continue
-        if parameter.kind is parameter.KEYWORD_ONLY and not keyword_only:
-            shown.append("*")
-            keyword_only = True
-        shown.append(_parameter(parameter))
-    result = (
-        "" if inspect.isclass(thing) or found.return_annotation is found.empty else f" -> {found.return_annotation}"
-    )
-    line = f"({', '.join(shown)}){result}"
-    return line if len(line) <= 90 else "(\n    " + ",\n    ".join(shown) + f",\n){result}"
-
-
-def _parameter(parameter: inspect.Parameter) -> str:
-    stars = "*" * ((parameter.kind is parameter.VAR_POSITIONAL) + 2 * (parameter.kind is parameter.VAR_KEYWORD))
-    text = f"{stars}{parameter.name}"
-    if parameter.annotation is not parameter.empty:
-        text += f": {parameter.annotation}"
-    if parameter.default is not parameter.empty:
-        default = repr(parameter.default)
-        text += f" = {'…' if default.startswith('<') or len(default) > 40 else default}"
-    return text
 
 
 def _doc(thing: Any) -> str:

@@ -20,9 +20,9 @@ from rendergraph.reference import (
     output_facts,
     summary,
 )
+from rendergraph.reference.python import signature
 from rendergraph.session import Selection
 
-from .api import signature
 from .markdown import block, code, folded, listing, page, prose, table
 from .pictures import Studio, View, catalog, example_and_base, exhibit
 

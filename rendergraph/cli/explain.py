@@ -40,8 +40,9 @@ def command(topic: str, glsl: bool, pipeline: str | None, step: int | None, sele
     """Explain a node, pipeline, scene, error or file format.
 
     Environments are explained, too. `pipeline`, `scene`, `sweep`, `settings` and `header` list every key of that kind
-    of file. The path of a file explains the pipeline, scene or node in it. With --glsl, TOPIC is a node type, which is
-    shown in a small pipeline, or a node of --pipeline; the options of `run` change either pipeline.
+    of file. `Steps` or `Pipeline` explains a class or function of Python; `api` lists what nodes import, and `glsl`
+    what shaders include. The path of a file explains the pipeline, scene or node in it. With --glsl, TOPIC is a node
+    type, which is shown in a small pipeline, or a node of --pipeline; the options of `run` change either pipeline.
 
     \b
     Examples:
@@ -51,6 +52,7 @@ def command(topic: str, glsl: bool, pipeline: str | None, step: int | None, sele
       rendergraph explain studio
       rendergraph explain RG103
       rendergraph explain scene
+      rendergraph explain Steps
       rendergraph explain tonemap --glsl
       rendergraph explain ao --glsl --step 2 --pipeline ssao-hemisphere -s ao.samples=16
     """
@@ -85,6 +87,8 @@ def _node_or_file(
     if topic not in catalog:
         if not file and not glsl:
             file, file_text = _environment(topic)
+        if not file and not glsl and (file := reference.describe_python(topic)):
+            file_text = _python_text(file)
         if not file:
             raise InputError(Problem("RG511", _unknown(topic, catalog.names(), SHADERS)))
         emit_json(file) if as_json else emit(file_text)
@@ -113,10 +117,23 @@ def _unknown(topic: str, types: Any, shader_suffixes: tuple[str, ...]) -> str:
     names = [*types, *reference.FILE_KINDS, *shipped_pipelines(), *shipped_scenes(), *SHIPPED]
     if topic in names:
         return f"'{topic}' has no program; --glsl takes a node type, or a node of --pipeline"
+    names += [*reference.public_names(), "api", "glsl"]
     hint = f"; did you mean '{shader}'?" if shader else suggestion(topic, names)
     return f"unknown name '{topic}'{hint}" + (
         "" if shader else "; `nodes`, `pipelines`, `scenes` and `environments` list names"
     )
+
+
+def _python_text(entry: Entry) -> str:
+    """Return a public name of Python, or a list of names, as text."""
+    if entry.get("topic") == "api":
+        names = "\n".join(f"{name}  {line}" for name, line in entry["names"].items())
+        return sections("rendergraph.api  (what a node imports)", section("Names", names))
+    if entry.get("topic") == "glsl":
+        parts = [section(f"#include <{name}>", "\n".join(lines)) for name, lines in entry["includes"].items() if lines]
+        return sections("GLSL  (functions of the shared includes)", *parts)
+    members = [section(one["signature"], one["doc"]) for one in entry["members"]]
+    return sections(f"{entry['name']}  (Python)", entry["signature"], entry["doc"], *members)
 
 
 def _environment(topic: str) -> tuple[Entry, str]:

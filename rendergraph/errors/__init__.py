@@ -190,6 +190,10 @@ class RendergraphError(Exception):
     def __reduce__(self) -> tuple[type[RendergraphError], tuple[tuple[Problem, ...]]]:
         return type(self), (self.problems,)  # to be raised again in another process
 
+    def _render_traceback_(self) -> list[str]:
+        """What a notebook shows: the message, which has the place of each mistake, and no lines of the framework."""
+        return [f"{type(self).__name__}: {self}"]
+
     def relocated(self, relocate: Callable[[Problem], Problem]) -> Self:
         """Return the same error with each of its problems relocated."""
         return type(self)([relocate(problem) for problem in self.problems])

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rendergraph.reference.examples import example_file, example_text
     from rendergraph.reference.node_types import describe_node, input_facts, meaning, output_facts, summary
     from rendergraph.reference.programs import complete_shader, describe_program, describe_programs, find_node_of_type
+    from rendergraph.reference.python import describe_python, public_names
     from rendergraph.reference.topics import FILE_KINDS, error_codes, error_page, file_keys, table_of
 
 
@@ -25,6 +26,7 @@ __getattr__, __dir__ = lazy_exports(
         "examples": ("example_file", "example_text"),
         "node_types": ("describe_node", "input_facts", "meaning", "output_facts", "summary"),
         "programs": ("complete_shader", "describe_program", "describe_programs", "find_node_of_type"),
+        "python": ("describe_python", "public_names"),
         "topics": ("FILE_KINDS", "error_codes", "error_page", "file_keys", "table_of"),
     },
 )

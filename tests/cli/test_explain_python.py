@@ -1,0 +1,41 @@
+"""`explain` of names in Python and of shared includes, and that every public name is documented."""
+
+from __future__ import annotations
+
+import pytest
+
+import rendergraph as rg
+from rendergraph import reference
+from rendergraph.errors import InputError
+from rendergraph.reference.python import public_members, public_names
+
+
+@pytest.mark.parametrize("name", sorted(set(rg.__all__) - {"CacheLimits"}))
+def test_every_public_name_has_a_documentation_and_so_have_its_members(name: str) -> None:
+    found = reference.describe_python(name)
+    assert len(found["doc"]) > 20
+    assert all(member["doc"] for member in found["members"])
+
+
+def test_names_of_authors_are_explained() -> None:
+    steps = reference.describe_python("Steps")
+    assert {"fullscreen", "compute", "geometry", "upload"} <= {one["name"] for one in steps["members"]}
+    names = reference.describe_python("api")["names"]
+    assert {"Node", "Input", "History", "param", "Radiance"} <= names.keys()
+    includes = reference.describe_python("glsl")["includes"]
+    assert any("world_position(" in line for line in includes["view.glsl"])
+    assert reference.describe_python("Nothing") == {}
+    assert "render" in dict(public_members(public_names()["Pipeline"]))
+
+
+def test_a_mistake_in_a_notebook_is_one_message() -> None:
+    with pytest.raises(InputError) as raised:
+        rg.load({"extends": "forward", "nodes": {"light": {"params": {"ambiant": 1}}}}).render()
+    (text,) = raised.value._render_traceback_()
+    assert text == f"InputError: {raised.value}"
+    assert "\n" not in text
+
+
+def test_a_node_without_a_port_is_not_a_tap() -> None:
+    with pytest.raises(InputError, match=r"'light' is a node, not a port; write light\.radiance"):
+        rg.load("forward").expand(taps="light")
