@@ -110,7 +110,7 @@ def endpoint(graph: Graph, text: str) -> Endpoint:
     if not node and any(end.node == text for end in graph.textures):
         ends = [Endpoint(text, name) for name in graph[text].type.cls.outputs()]
         held = [str(end) for end in ends if end in graph.textures and graph.textures[end].holds_values]
-        raise InputError(Problem("RG109", f"'{text}' is a node, not a port; write {' or '.join(held[:4])}"))
+        raise InputError(Problem("RG109", f"'{text}' is a node, not a port; write one of {', '.join(held[:20])}"))
     names = [known.id for known in graph.nodes]
     if node in graph.unlit:
         text = f"node '{node}' is left out: the scene has no environment; give it one (--environment)"

@@ -37,5 +37,5 @@ def test_a_mistake_in_a_notebook_is_one_message() -> None:
 
 
 def test_a_node_without_a_port_is_not_a_tap() -> None:
-    with pytest.raises(InputError, match=r"'light' is a node, not a port; write light\.radiance"):
+    with pytest.raises(InputError, match=r"'light' is a node, not a port; write one of .*light\.radiance"):
         rg.load("forward").expand(taps="light")
