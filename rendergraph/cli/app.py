@@ -58,6 +58,7 @@ VERBS = (
     "new-node",
     "check-node",
     "doctor",
+    "mcp",
 )
 """In the order of `--help`."""
 

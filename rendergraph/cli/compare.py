@@ -219,7 +219,7 @@ def command(
     if as_json:
         emit_json(comparison.as_json() | ({"report": str(output)} if output else {}) | {"exceeded": beyond})
     else:
-        emit(_text(comparison))
+        emit(comparison_text(comparison))
         if output is not None:
             say(f"report: {output}")
     for text in beyond:
@@ -385,7 +385,8 @@ def _figure(name: str, result: Result) -> str:
     return "–" if value is None else f"{value:.4g}"
 
 
-def _text(comparison: Comparison) -> str:
+def comparison_text(comparison: Comparison) -> str:
+    """Return what `compare` prints."""
     width, height = comparison.size
     heads, rows = summary(comparison.results)
     where = [comparison.scene, f"{width}×{height}", f"against {comparison.reference.name}"]

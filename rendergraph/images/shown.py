@@ -44,9 +44,13 @@ class Shown:
         write(Path(path), self.pixels)
         return Path(path)
 
+    @property
+    def png(self) -> bytes:
+        """The picture as a PNG file, without the scale."""
+        return picture_bytes((Path("x.png"), self.pixels, None, "data", False), {})
+
     def _repr_html_(self) -> str:
-        data = picture_bytes((Path("x.png"), self.pixels, None, "data", False), {})
-        source, alt = f"data:image/png;base64,{base64.b64encode(data).decode()}", escape(self.name)
+        source, alt = f"data:image/png;base64,{base64.b64encode(self.png).decode()}", escape(self.name)
         picture = f'<img src="{source}" alt="{alt}" style="image-rendering:pixelated">'
         scale = ""
         if self.low is not None:

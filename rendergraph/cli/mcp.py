@@ -1,0 +1,256 @@
+"""`rendergraph mcp`: the verbs for a coding assistant, by the Model Context Protocol, inside one folder.
+
+An assistant is as untrusted as a file: what it names must be shipped or lie below the folder, links followed, and
+nothing is written there unless `--write` allows it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+import json
+import os
+import re
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from rendergraph.cli.lazy_click import click
+from rendergraph.cli.output import data_stream
+from rendergraph.errors import InputError, Problem, RendergraphError, UsageError
+from rendergraph.installed import require
+from rendergraph.resources import is_name
+
+if TYPE_CHECKING:
+    from mcp.server import MCPServer
+
+    from rendergraph.session import Pipeline
+
+T = TypeVar("T")
+
+MOST_SIDE = 1024
+"""Limit of width and height: pictures travel in messages, and software renderers are slow."""
+_INSTRUCTIONS = """Renderers are YAML files, whose nodes are render passes. A `pipeline` is a shipped name (`forward`),
+a YAML file, or the YAML text of a pipeline itself, such as `extends: forward` with changes. `settings` are texts such
+as `shadows.taps=4`, `ao.enabled=false` or `scene.lights.key.intensity=2`. Begin with `explain` of `pipeline`."""
+_PATH_LIKE = re.compile(r"[^\s\[\]{}:,\"'=]+")
+
+
+@click.command("mcp")
+@click.option("--root", type=click.Path(file_okay=False, exists=True), default=".", help="The folder to work in.")
+@click.option("--write", is_flag=True, help="Let the assistant write pictures and pipelines into the folder.")
+def command(root: str, write: bool) -> None:
+    """Serve a coding assistant over standard input and output.
+
+    The Model Context Protocol offers it `nodes`, `explain`, `check`, `plan`, `run`, `compare` and `texture`, in one
+    folder and without writing files. It needs `pip install 'rendergraph[mcp]'`.
+
+    \b
+    Examples:
+      rendergraph mcp
+      rendergraph mcp --root study --write
+    """
+    require("mcp", "mcp", "mcp")
+    os.chdir(root)
+    with contextlib.ExitStack() as stack:
+        if not write:  # what a truth keeps on the disk, too
+            os.environ["RENDERGRAPH_CACHE"] = stack.enter_context(tempfile.TemporaryDirectory(prefix="rendergraph-"))
+        stack.enter_context(contextlib.redirect_stdout(data_stream()))  # it carries the messages
+        server(Path.cwd(), write=write).run()
+
+
+def server(root: Path, *, write: bool = False) -> MCPServer:
+    """Return a server for a folder, which is the current one."""
+    from mcp.server import MCPServer
+    from mcp.server.mcpserver import Image
+
+    from rendergraph.version import __version__
+
+    # One thread draws: a context of OpenGL belongs to the thread that created it.
+    worker = ThreadPoolExecutor(1, thread_name_prefix="rendergraph-mcp")
+    made = MCPServer("rendergraph", instructions=_INSTRUCTIONS, version=__version__, log_level="ERROR")
+
+    tool = made.tool(structured_output=False)
+
+    async def drawn(work: Callable[[], T]) -> T:
+        return await asyncio.get_running_loop().run_in_executor(worker, _told(work))
+
+    @tool
+    async def nodes() -> str:
+        """List the node types by family, each with a line."""
+        return await drawn(lambda: _verb("nodes"))
+
+    @tool
+    async def explain(topic: str) -> str:
+        """Explain a node type, a pipeline, a scene, an error code, a kind of file (`pipeline`, `scene`) or `api`."""
+        return await drawn(lambda: _verb("explain", *_inside(root, topic)))
+
+    @tool
+    async def check(pipeline: str, settings: list[str] | None = None) -> str:
+        """Find all mistakes in a pipeline without rendering it, each with its place and the way out."""
+        return await drawn(lambda: _verb("check", *_words(root, pipeline, settings), text=pipeline))
+
+    @tool
+    async def plan(pipeline: str, settings: list[str] | None = None) -> str:
+        """Print the order of passes, and the memory of their textures."""
+        return await drawn(lambda: _verb("plan", *_words(root, pipeline, settings), text=pipeline))
+
+    @tool
+    async def run(
+        pipeline: str,
+        settings: list[str] | None = None,
+        size: tuple[int, int] = (480, 270),
+        frame: int = 1,
+        output: str | None = None,
+    ) -> list[Any]:
+        """Render a pipeline and return its picture; `output` writes it to a file, if the server may write."""
+
+        def work() -> list[Any]:
+            target = _target(root, output, write=write)
+            found = _pipeline(root, pipeline, settings, size).render(frames=range(frame, frame + 1))
+            shown = [f"{one['node']} ({one['type']})" for one in found.passes]
+            saved = f"; written to {found.save(target)}" if target is not None else ""
+            return [f"{found!r}; passes: {', '.join(shown)}{saved}", Image(data=found._repr_png_(), format="png")]
+
+        return await drawn(work)
+
+    @tool
+    async def texture(
+        pipeline: str,
+        port: str,
+        settings: list[str] | None = None,
+        size: tuple[int, int] = (480, 270),
+        layer: int | None = None,
+        channel: int | None = None,
+    ) -> list[Any]:
+        """Return the texture of any port, `ao.occlusion`, as a picture in false colours, with its range and mean."""
+
+        def work() -> list[Any]:
+            found = _pipeline(root, pipeline, settings, size).render(taps=[port])
+            shown, values = found.show(port, layer=layer, channel=channel), found[port]
+            text = f"{shown!r}; shape {values.shape}, {values.dtype}, least {values.min():g}, greatest {values.max():g}"
+            return [f"{text}, mean {values.mean():g}", Image(data=shown.png, format="png")]
+
+        return await drawn(work)
+
+    @tool
+    async def compare(
+        pipelines: list[str],
+        settings: list[list[str]] | None = None,
+        reference: str | None = None,
+        size: tuple[int, int] = (320, 180),
+    ) -> list[Any]:
+        """Compare pictures, times and memory of pipelines; `settings` has those of each. The first is the reference."""
+
+        def work() -> list[Any]:
+            from rendergraph.cli.compare import comparison_text
+            from rendergraph.compare import compare
+            from rendergraph.images import picture_bytes, viewable
+
+            each = settings or [[] for _ in pipelines]
+            if len(each) != len(pipelines):
+                raise UsageError(Problem("RG500", f"there are {len(pipelines)} pipelines, and settings of {len(each)}"))
+            given = [_pipeline(root, name, own, size) for name, own in zip(pipelines, each, strict=True)]
+            against = None if reference is None else _pipeline(root, reference, (), size)
+            found = compare(given, against, frames=3)
+            words = {"display": "display_color", "linear": "radiance"}
+            pictures = [viewable(r.pixels, words.get(r.encoding, "any")) for r in found if r.pixels is not None]
+            data = [picture_bytes((Path("x.png"), pixels, None, "data", False), {}) for pixels in pictures[:6]]
+            return [comparison_text(found), *(Image(data=one, format="png") for one in data)]
+
+        return await drawn(work)
+
+    if write:
+
+        @tool
+        async def write_file(path: str, text: str) -> str:
+            """Write a pipeline, a scene or a shader (.yaml, .frag, .comp, .glsl) into the folder."""
+
+            def work() -> str:
+                target = _target(root, path, write=True)
+                if target is None or target.suffix not in (".yaml", ".frag", ".comp", ".glsl"):
+                    raise UsageError(Problem("RG501", "expected a file that ends in .yaml, .frag, .comp or .glsl"))
+                target.parent.mkdir(parents=True, exist_ok=True)
+                target.write_text(text, encoding="utf-8")
+                return f"written to {target.relative_to(root)}"
+
+            return await drawn(work)
+
+    return made
+
+
+def _told(work: Callable[[], T]) -> Callable[[], T]:
+    """Return work whose mistakes are an error that an assistant reads: the message with the place of each."""
+    from mcp.server.mcpserver.exceptions import ToolError
+
+    def told() -> T:
+        try:
+            return work()
+        except (RendergraphError, KeyError) as error:
+            raise ToolError(str(error)) from None
+
+    return told
+
+
+def _verb(*words: str, text: str = "") -> str:
+    """Run a verb and return what it prints; of a text with several lines, which it reads from standard input."""
+    from mcp.server.mcpserver.exceptions import ToolError
+
+    from rendergraph.cli.app import main
+
+    out, error, stdin = io.StringIO(), io.StringIO(), sys.stdin
+    try:
+        sys.stdin = io.TextIOWrapper(io.BytesIO(text.encode()))
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
+            code = main(list(words))
+    finally:
+        sys.stdin = stdin
+    printed = "\n".join(filter(None, (out.getvalue().rstrip("\n"), error.getvalue().rstrip("\n"))))
+    if code:
+        raise ToolError(printed)
+    return printed
+
+
+def _words(root: Path, pipeline: str, settings: Sequence[str] | None) -> list[str]:
+    checked = _inside(root, *(settings or ()))
+    name = "-" if "\n" in pipeline else _inside(root, pipeline)[0]
+    return [name, *(word for setting in checked for word in ("-s", setting))]
+
+
+def _pipeline(root: Path, pipeline: str, settings: Sequence[str] | None, size: tuple[int, int]) -> Pipeline:
+    from rendergraph.session import load
+
+    if max(size) > MOST_SIDE:
+        raise UsageError(Problem("RG500", f"a picture has at most {MOST_SIDE} pixels a side; got {size[0]}×{size[1]}"))
+    name = pipeline if "\n" in pipeline else _inside(root, pipeline)[0]
+    return load(name, size=(size[0], size[1]), sets=_inside(root, *(settings or ())))
+
+
+def _inside(root: Path, *texts: str) -> list[str]:
+    """Return texts in which nothing that may be a path leads out of the folder."""
+    for text in texts:
+        for word in _PATH_LIKE.findall(text):
+            if not is_name(word) and ("/" in word or ".." in word or "~" in word):
+                _check(root, word)
+        if Path(text).exists():
+            _check(root, text)
+    return list(texts)
+
+
+def _check(root: Path, word: str) -> Path:
+    path = (root / Path(word).expanduser()).resolve()
+    if not path.is_relative_to(root.resolve()):
+        raise InputError(Problem("RG012", f"'{word}' lies outside the folder of this server, {json.dumps(str(root))}"))
+    return path
+
+
+def _target(root: Path, output: str | None, *, write: bool) -> Path | None:
+    if output is None:
+        return None
+    if not write:
+        raise UsageError(Problem("RG500", "this server writes no files; start it with: rendergraph mcp --write"))
+    return _check(root, output)
