@@ -275,21 +275,26 @@ def _load(name: str, names: Sequence[str], select: options.Select) -> Pipeline:
 
 def _with(settings: Sequence[str], selection: Selection) -> Pipeline:
     """Return the pipeline with the settings of one variant; mistakes in them are located at `--with`."""
-    return _set_by("--with", settings, replace(selection, sets=(*selection.sets, *settings)))
+    pipeline = _set_by("--with", settings, replace(selection, sets=(*selection.sets, *settings)))
+    warn(pipeline.link().warnings)
+    return pipeline
 
 
 def _set_by(option: str, settings: Sequence[str], selection: Selection) -> Pipeline:
     """Return a pipeline some of whose settings come from an option, where mistakes in them are located."""
+    from rendergraph.session import Pipeline
 
     def located(problem: Problem) -> Problem:
         setting = problem.place.option("--set") if problem.place else None
         typed = setting is not None and setting.text in settings
         return problem.relocate(Place(Option(option, f"'{setting.text}'"))) if setting and typed else problem
 
+    pipeline = Pipeline(selection)
     try:
-        return options.linked(selection)
+        pipeline.link()
     except InputError as error:
         raise error.relocated(located) from None
+    return pipeline
 
 
 def load_reference(reference: str | None, select: options.Select) -> Path | Pipeline | None:
@@ -302,7 +307,7 @@ def load_reference(reference: str | None, select: options.Select) -> Path | Pipe
     if is_picture(reference):
         return Path(reference)
     selection = reference_selection(select(reference))
-    return _set_by("--reference", selection.sets, selection)
+    return _set_by("--reference", selection.sets, selection)  # it gets another scene, to which no warning applies
 
 
 def _write(comparison: Comparison, output: Path, crops: Sequence[Any], *, title: str, note: str) -> None:

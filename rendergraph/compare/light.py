@@ -89,6 +89,8 @@ def displayed(gpu: Gpu, planned: Planned, light: Endpoint, pixels: Pixels, outpu
     import networkx as nx  # as above
 
     graph, frames = planned.linked.graph, range(1, frame + 1)
+    if graph.outputs[output] == light:
+        return pixels
     behind = nx.descendants(_ports(graph), light)
     read = {end.now for node in graph.nodes for ends in node.inputs.values() for end in ends}
     figures = [end for end in graph.textures if end in behind & read and _is_figure(graph.textures[end])]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -464,26 +464,14 @@ def _twins(run: Run, pipeline: Pipeline, notes: list[str]) -> Iterator[Twin]:
 
 
 def _with_twin(pipeline: Pipeline, node: str, twin: NodeType) -> Pipeline:
-    """Return a pipeline with another type for a node, without what was set for the node and the type lacks."""
-    selection = pipeline.selection
+    """Return a pipeline with another type for a node, without what `-s` sets for the node and the type lacks."""
     known = {*twin.cls.parameters(), *twin.cls.inputs(), *twin.cls.groups(), "enabled"}
-    kept = [text for text in selection.sets if _path(text) not in {(node, "type")} and not _is_lost(text, node, known)]
-    patches = selection.patches
-    spec = pipeline.resolve().spec.nodes.get(node)
-    if spec is not None and "/" not in node:
-        lost = {part: {key: None for key in getattr(spec, part) if key not in known} for part in ("params", "inputs")}
-        patches = (*patches, {"nodes": {node: {part: keys for part, keys in lost.items() if keys}}})
-    return pipeline.select(sets=(*kept, f"{node}.type={twin.name}"), patches=patches)
 
+    def fits(setting: str) -> bool:
+        owner, _, name = setting.partition("=")[0].strip().rpartition(".")
+        return owner != node or name in known
 
-def _path(setting: str) -> tuple[str, str]:
-    node, _, name = setting.partition("=")[0].strip().rpartition(".")
-    return node, name
-
-
-def _is_lost(setting: str, node: str, known: Collection[str]) -> bool:
-    owner, name = _path(setting)
-    return owner == node and name not in known
+    return pipeline.select(sets=(*filter(fits, pipeline.selection.sets), f"{node}.type={twin.name}"))
 
 
 def _study(base: Pipeline, frame: int, reference: str) -> dict[str, Any]:

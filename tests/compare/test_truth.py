@@ -278,6 +278,16 @@ def test_light_is_compared_before_bloom_and_pictures_with_the_exposure_of_the_fi
     assert np.array_equal(shown, result.pixels)  # its own light gives its own picture
 
 
+def test_pipelines_without_a_picture_are_compared_by_their_light(make: Maker, gl: rg.Session) -> None:
+    nodes = {"nodes": {**{name: NODES[name] for name in ("shadows", "light")}, "ao": NODES["ao"]}}
+    found = compare(make(nodes | {"outputs": {"radiance": "light.radiance"}}), make.truth(), frames=1, session=gl)
+    (result,) = found.results
+    assert found.reference.output == "radiance"
+    assert np.array_equal(found.reference.pixels, found.reference.light)  # type: ignore[arg-type]
+    assert result.metrics.rmse == pytest.approx(result.radiance_rmse)
+    assert result.metrics.rmse > 0.1
+
+
 def test_the_twin_that_reduces_the_error_most_is_named(make: Maker, gl: rg.Session) -> None:
     pipeline = make.approximate().set("shadows.darkness", 0.1)  # which the twin lacks
     found = compare(pipeline, make.truth(), frames=1, session=gl, reference_noise=0.005)
