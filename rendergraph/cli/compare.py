@@ -68,7 +68,7 @@ def _crop(text: str) -> tuple[int, int, int, int]:
 
 reference_option = click.option(
     "--reference",
-    metavar="FILE|PIPELINE",
+    metavar="FILE|PIPELINE[:PATH=VALUE,…]",
     shell_complete=options.offered("pipelines"),
     help="Measure against this picture or pipeline; the first by default.",
 )
