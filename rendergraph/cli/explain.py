@@ -202,6 +202,7 @@ def _scene_text(entry: Entry) -> str:
         entry["line"],
         listed("Objects", objects, ("name", "triangles", "material", ""), right=(1,)),
         listed("Clips", [(one["name"], f"{one['seconds']:g} s") for one in entry["clips"]]),
+        listed("Variants", [(name, "") for name in entry["variants"]]),
         listed("Materials", [(one["name"], one["line"]) for one in entry["materials"]]),
         listed("Lights", [(one["name"], one["line"]) for one in entry["lights"]]),
         section("Cameras", [(one["name"], one["line"]) for one in entry["cameras"]]),

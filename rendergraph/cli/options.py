@@ -272,6 +272,9 @@ SELECTION_OPTIONS = {
         shell_complete=offered("environments"),
         help="Environment map: a shipped name, .hdr or .exr, or `none` for the file's own lights alone.",
     ),
+    "variant": click.option(
+        "--variant", metavar="NAME", help="Variant of a glTF file, with other materials; `explain FILE` lists them."
+    ),
     "ground": click.option(
         "--ground", is_flag=True, help="Put a ground below the scene that shows the environment and receives shadows."
     ),

@@ -77,6 +77,7 @@ def describe_scene(name: str, path: Path, scene: Scene) -> dict[str, Any]:
         "clips": [
             {"name": clip.name, "seconds": round(clip.length, 3)} for rig in scene.rigs for clip in rig.clips.values()
         ],
+        "variants": list(scene.variants),
         "materials": [{"name": one.name, "line": _material(one)} for one in scene.materials],
         "extensions": used_extensions(path),
         "lights": [{"name": light.name, "line": _light(light)} for light in scene.lights],

@@ -21,7 +21,7 @@ from msgspec.structs import replace
 
 from rendergraph.declare import Added
 from rendergraph.declare.extensions import ImageLoader
-from rendergraph.document import YamlLimits
+from rendergraph.document import YamlLimits, shown
 from rendergraph.facts import NO_EXTRA, Extra
 from rendergraph.scene.edges import Edges, find_edges, is_solid
 from rendergraph.stamps import Stamps
@@ -411,6 +411,7 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         files: every file accessed while reading it, as it was.
         ground: whether to add a ground, and from which height the environment is projected on it, in metres; 0 suits
             the objects.
+        variants: by name the materials of the objects that look different in it (KHR_materials_variants).
     """
 
     name: str
@@ -432,6 +433,19 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
     follows: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     files: Stamps = field(default_factory=dict)
     ground: float | None = None
+    variants: Mapping[str, Mapping[int, int]] = field(default_factory=dict)
+
+    def with_variant(self, name: str) -> Scene:
+        """Return the scene with the materials of one of its variants."""
+        objects = list(self.objects)
+        for number, material in self.variants[name].items():
+            objects[number] = replace(objects[number], material=material)
+        return replace(self, objects=tuple(objects))
+
+    def variant_mistake(self, name: str) -> str | None:
+        """Return what is wrong with the name of a variant; None if there is such a variant."""
+        known = f"it has {', '.join(map(repr, self.variants))}" if self.variants else "it has none"
+        return None if name in self.variants else f"has no variant '{shown(name)}'; {known}"
 
     @cached_property
     def catchers(self) -> list[int]:

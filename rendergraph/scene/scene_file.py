@@ -149,6 +149,7 @@ class _Reader:
         self.kinds: Mapping[str, TextureKind] = SHIPPED_TEXTURES
         self.vertices = 0
         self.ground: float | None = None
+        self.variants: dict[str, dict[int, int]] = {}
 
     def read(self, root: Value) -> Scene:
         """The scene; only to be used if no problem was found."""
@@ -180,6 +181,7 @@ class _Reader:
             plugin_keys=self.plugin_keys,
             rigs=tuple(self.rigs),
             ground=self.ground,
+            variants=self.variants,
             follows=self._follows(top),
         )
         return animate.following(scene, {}) if scene.follows and not self.validator.problems else scene
@@ -466,9 +468,14 @@ class _Reader:
     ) -> None:
         scene = file.scene
         objects, lights, cameras = [], [], []
-        for part in scene.objects:
+        if values.get("variant") in scene.variants:
+            scene = scene.with_variant(values["variant"])
+        for number, part in enumerate(scene.objects):
             changes = values | overrides.get(part.name, overrides.get(part.node, {}))
             material = changes.get("material")
+            for variant, materials in scene.variants.items() if material is None and "variant" not in values else ():
+                if number in materials:
+                    self.variants.setdefault(variant, {})[len(self.objects)] = materials[number] + file.first_material
             objects.append((len(self.objects), part.transform))
             self.objects.append(
                 Object(
@@ -515,6 +522,9 @@ class _Reader:
             self.mesh_files[path] = read_mesh(path, inner, unknown)
             self.reading.add_warnings(inner.warnings)
         scene = self.mesh_files[path]
+        variant = entry.get("variant")
+        if variant is not None and isinstance(variant.data, str) and (mistake := scene.variant_mistake(variant.data)):
+            self.validator.report(variant, "RG322", f"object '{shown(name)}': its file {mistake}")
         playback = self._playback(name, entry, scene)
         key = path, *sorted((playback or {}).items()), playback is None
         if key not in self.files:

@@ -101,6 +101,7 @@ ANIMATION = Table(
     ),
 )
 _PLAYS = Key("animation", ANIMATION, "For a file: plays a clip over and over; without it the file is at rest.")
+_VARIANT = Key("variant", NAME, "For a file: one of its variants, which have other materials.")
 OBJECT = Table(
     "object '{}'",
     (
@@ -118,7 +119,7 @@ OBJECT = Table(
             "Draws it many times; the copies are called `name.0`, `name.1` and so on.",
         ),
     ),
-    {"shape": {name: shape.keys for name, shape in SHAPES.items()}, "file": (_OVERRIDES, _PLAYS)},
+    {"shape": {name: shape.keys for name, shape in SHAPES.items()}, "file": (_OVERRIDES, _PLAYS, _VARIANT)},
 )
 
 TEXTURES = (
@@ -323,7 +324,8 @@ def with_plugins(
         added = {one.name: one for one in extensions.scene_keys(section)}
         for name in asked.get(section, ()):
             extensions.scene_key(section, name)
-        taken = NAMES[section] | (_SHAPE_KEYS | {"overrides", "animation"} if section == "objects" else set())
+        own_keys = {"overrides", "animation", "variant"} | _SHAPE_KEYS if section == "objects" else set()
+        taken = NAMES[section] | own_keys
         if wrong := next((one for one in added.values() if one.name in taken), None):
             text = f"plugin '{wrong.plugin}': scene_keys['{section}'] has '{wrong.name}', a key of rendergraph's own"
             raise InputError(Problem("RG495", text, Place(shown_file(wrong.file))))
@@ -331,7 +333,7 @@ def with_plugins(
         found[section] = replace(found[section], keys=(*found[section].keys, *keys))
         if keys and section == "objects":
             overrides = replace(_OVERRIDES, type=MapOf(replace(OVERRIDE, keys=(*OVERRIDE.keys, *keys))))
-            alternatives = {**OBJECT.alternatives, "file": (overrides, _PLAYS)}
+            alternatives = {**OBJECT.alternatives, "file": (overrides, _PLAYS, _VARIANT)}
             found[section] = replace(found[section], alternatives=alternatives)
     return found
 

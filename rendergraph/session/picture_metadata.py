@@ -41,6 +41,7 @@ def pipeline_metadata(linked: Linked) -> dict[str, str]:
         "folder": None if path is None or path in shipped_pipelines().values() else _inside(path.parent),
         "camera": selection.camera,
         "environment": None if selection.environment is None else shown_file(selection.environment.absolute()),
+        "variant": selection.variant,
         "ground": "true" if selection.ground else None,
     }
     return {f"rendergraph:{name}": text for name, text in fields.items() if text is not None}
@@ -61,11 +62,12 @@ def _inside(folder: Path) -> str | None:
 
 
 class PictureMetadata(Struct, frozen=True):
-    """How a picture was made: its pipeline; camera, environment and ground, if chosen beside it; its frame."""
+    """How a picture was made: its pipeline; what was chosen beside it; its frame."""
 
     document: Document
     camera: str | None
     environment: Path | None
+    variant: str | None
     ground: bool
     frame: int
     fps: float
@@ -105,6 +107,7 @@ def read_picture_metadata(path: Path, limits: YamlLimits) -> PictureMetadata:
         document,
         fields.get("camera"),
         Path(fields["environment"]) if "environment" in fields else None,
+        fields.get("variant"),
         "ground" in fields,
         _frame(fields),
         _fps(fields),

@@ -35,6 +35,7 @@ def load(
     *,
     scene: str | Path | Mapping[str, Any] | None = None,
     environment: str | Path | npt.NDArray[Any] | None = None,
+    variant: str | None = None,
     ground: bool = False,
     transparent: bool = False,
     camera: str | None = None,
@@ -55,6 +56,7 @@ def load(
     pipeline = Pipeline(
         Selection(
             source=source if isinstance(source, Mapping) else str(source),
+            variant=variant,
             ground=ground,
             transparent=transparent,
             camera=camera,

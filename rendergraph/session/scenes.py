@@ -12,6 +12,7 @@ from msgspec.structs import replace
 from rendergraph import stamps
 from rendergraph.declare import Extensions
 from rendergraph.document import YamlLimits
+from rendergraph.errors import InputError, Option, Place, Problem
 from rendergraph.resolve.spec import flow
 from rendergraph.scene.animate import complete
 from rendergraph.scene.environments import named
@@ -31,7 +32,8 @@ def scene_of(resolved: Resolved) -> Scene:
     changes = spec.scene_changes
     roots = spec.roots.folders if spec.scene is not None or changes is not None else ()
     key: tuple[Any, ...] = (Path.cwd(), spec.scene, selection.environment, selection.camera, roots, limits)
-    key = (*key, selection.ground, selection.shutter, selection.plugins, changes and (spec.path, flow(changes)))
+    key = (*key, selection.variant, selection.ground, selection.shutter, selection.plugins)
+    key = (*key, changes and (spec.path, flow(changes)))
     # One camera serves pictures of about one shape, such as a viewer's smaller ones.
     shape = max(math.floor(10 * spec.size[0] / spec.size[1] + 0.1), 1) / 10
     found = _IN_USE.get(key) or _IN_USE.get((*key, shape))
@@ -42,6 +44,10 @@ def scene_of(resolved: Resolved) -> Scene:
         if spec.scene is not None or changes is not None:
             check = spec.roots.check
             scene = load(spec.scene, changes=changes, check_path=check, limits=limits, extensions=extensions)
+        if (variant := selection.variant) is not None:
+            if mistake := scene.variant_mistake(variant):
+                raise InputError(Problem("RG322", f"the scene {mistake}", Place(Option("--variant", variant))))
+            scene = scene.with_variant(variant)
         bare = selection.environment == Path("none")
         if bare:
             scene = replace(scene, environment=None)

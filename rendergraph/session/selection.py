@@ -37,6 +37,7 @@ class Selection(Struct, frozen=True):
         source: a shipped name (`forward`), a path, YAML text of several lines, or a mapping with the keys of a file.
         scene, size: override the file's; `size` is width and height in pixels.
         environment: an equirectangular image that replaces the scene's.
+        variant: name of a variant of the scene's file, which has other materials.
         ground: whether a ground is put below the scene's objects, also where its file asks for none.
         transparent: whether to set the parameter `transparent` of every node that has one: pictures get alpha.
         camera: name of the scene's camera; its first by default.
@@ -54,6 +55,7 @@ class Selection(Struct, frozen=True):
     camera: str | None = None
     shutter: float | None = None
     environment: Path | None = None
+    variant: str | None = None
     ground: bool = False
     transparent: bool = False
     size: tuple[int, int] | None = None

@@ -73,6 +73,7 @@ def resolve(selection: Selection, catalog: Catalog | None = None, document: Docu
             selection,
             camera=selection.camera or picture.camera,
             environment=selection.environment or _environment(selection, picture),
+            variant=selection.variant or picture.variant,
             ground=selection.ground or picture.ground,
         )
     resolve_with = partial(

@@ -34,7 +34,7 @@ _READ = frozenset(
         *("KHR_materials_unlit", "KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_specular"),
         *("KHR_materials_anisotropy", "KHR_materials_clearcoat", "KHR_materials_sheen", "KHR_materials_iridescence"),
         *("KHR_materials_transmission", "KHR_materials_volume", "KHR_materials_dispersion"),
-        "KHR_texture_transform",
+        *("KHR_texture_transform", "KHR_materials_variants"),
         "KHR_mesh_quantization",
         "EXT_mesh_gpu_instancing",
     }
@@ -89,6 +89,7 @@ class _Reader:
         self._posed = [mesh if mesh.deform is None else replace(mesh, deform=None) for mesh in self._primitives.meshes]
         self._slots: dict[int, dict[tuple[int, int] | None, int]] = {}
         self._placed_materials = list(self._materials.materials)
+        self._variants: dict[str, dict[int, int]] = {one.name: {} for one in gltf.extensions.variants.variants}
 
     def _error(self, text: str) -> InputError:
         return self._reading.error("RG304", text)
@@ -102,8 +103,8 @@ class _Reader:
             if name not in _READ:
                 self._reading.warn("RG333", f"extension {name}", f"the extension '{shown(name)}' is left out")
 
-    def _mesh(self, mesh: schema.Mesh, number: int) -> list[tuple[int, int]]:
-        """Mesh and material index of each triangle primitive; material -1 is the default one."""
+    def _mesh(self, mesh: schema.Mesh, number: int) -> list[tuple[int, int, dict[str, int]]]:
+        """Mesh, material and materials by variant of each triangle primitive; material -1 is the default one."""
         result = []
         for k, primitive in enumerate(mesh.primitives):
             where = f"meshes[{number}].primitives[{k}]"
@@ -112,8 +113,19 @@ class _Reader:
                 raise self._error(f"{where}.targets: the primitives of a mesh must have the same number of them")
             index_of_mesh = self._primitives.mesh(primitive, mesh.name or f"mesh_{number}", where)
             if index_of_mesh is not None:
-                result.append((index_of_mesh, primitive.material))
+                result.append((index_of_mesh, primitive.material, self._materials_by_variant(primitive, where)))
         return result
+
+    def _materials_by_variant(self, primitive: schema.Primitive, where: str) -> dict[str, int]:
+        variants, found = self._gltf.extensions.variants.variants, dict[str, int]()
+        for mapping in primitive.extensions.variants.mappings:
+            check_index(self._reading, mapping.material, self._gltf.materials, f"{where}: material", "materials")
+            if mapping.material < 0 or min(mapping.variants, default=0) < 0:
+                raise self._error(f"{where}: a mapping of variants has no material, or no variant")
+            for index in mapping.variants:
+                check_index(self._reading, index, variants, f"{where}: a variant", "variants")
+                found[variants[index].name] = mapping.material
+        return found
 
     def _camera(self, camera: schema.Camera, where: str) -> Camera:
         lens = camera.perspective if camera.type == "perspective" else camera.orthographic
@@ -229,6 +241,7 @@ class _Reader:
             tuple(self._placed_materials),
             tuple(light for light, _ in lights),
             {camera.name: camera for camera, _ in cameras},
+            variants=self._variants,
         )
         if not rig.clips and all(mesh.deform is None for mesh in scene.meshes):
             return scene
@@ -276,7 +289,9 @@ class _Reader:
         is_instanced = node.json.extensions.instancing is not None
         for number, local in enumerate(node.instances):
             instance = f"{node.name}[{number}]" if is_instanced else node.name
-            for k, (mesh, material) in enumerate(self._meshes[node.json.mesh]):
+            for k, (mesh, material, by_variant) in enumerate(self._meshes[node.json.mesh]):
+                for variant, other in by_variant.items():
+                    self._variants[variant][len(objects)] = other
                 if material < 0:
                     material = default
                     self._placed_materials[default:] = [self._materials.default]

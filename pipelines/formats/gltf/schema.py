@@ -192,12 +192,26 @@ class Material(_Struct, frozen=True):
     extensions: MaterialExtensions = MaterialExtensions()
 
 
+class VariantMapping(_Struct, frozen=True):
+    material: Index
+    variants: list[Index]
+
+
+class VariantMappings(_Struct, frozen=True):
+    mappings: list[VariantMapping] = []
+
+
+class PrimitiveExtensions(_Struct, frozen=True):
+    variants: VariantMappings = field(name="KHR_materials_variants", default=VariantMappings())
+
+
 class Primitive(_Struct, frozen=True):
     attributes: Attributes
     indices: Index = -1
     material: Index = -1
     mode: Literal[0, 1, 2, 3, 4, 5, 6] = 4
     targets: list[Attributes] = []
+    extensions: PrimitiveExtensions = PrimitiveExtensions()
 
 
 class Mesh(_Struct, frozen=True):
@@ -302,8 +316,17 @@ class Scene(_Struct, frozen=True):
     nodes: list[Index] = []
 
 
+class Variant(_Struct, frozen=True):
+    name: str
+
+
+class Variants(_Struct, frozen=True):
+    variants: list[Variant] = []
+
+
 class FileExtensions(_Struct, frozen=True):
     punctual: Lights = field(name="KHR_lights_punctual", default=Lights())
+    variants: Variants = field(name="KHR_materials_variants", default=Variants())
 
 
 class Gltf(_Struct, frozen=True):
