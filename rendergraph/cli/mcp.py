@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import io
-import json
 import os
 import re
 import sys
@@ -20,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rendergraph.cli.lazy_click import click
-from rendergraph.cli.output import data_stream
+from rendergraph.cli.output import data_stream, emit_json
 from rendergraph.errors import InputError, Problem, RendergraphError, UsageError
 from rendergraph.installed import require
 from rendergraph.resources import is_name
@@ -43,7 +42,8 @@ _PATH_LIKE = re.compile(r"[^\s\[\]{}:,\"'=]+")
 @click.command("mcp")
 @click.option("--root", type=click.Path(file_okay=False, exists=True), default=".", help="The folder to work in.")
 @click.option("--write", is_flag=True, help="Let the assistant write pictures and pipelines into the folder.")
-def command(root: str, write: bool) -> None:
+@click.option("--json", "as_json", is_flag=True, help="Print the settings that an assistant needs, as JSON, and exit.")
+def command(root: str, write: bool, as_json: bool) -> None:
     """Serve a coding assistant over standard input and output.
 
     The Model Context Protocol offers it `nodes`, `explain`, `check`, `plan`, `run`, `compare` and `texture`, in one
@@ -54,6 +54,10 @@ def command(root: str, write: bool) -> None:
       rendergraph mcp
       rendergraph mcp --root study --write
     """
+    if as_json:
+        words = ["mcp", "--root", str(Path(root).resolve()), *(["--write"] if write else [])]
+        emit_json({"mcpServers": {"rendergraph": {"command": "rendergraph", "args": words}}})
+        return
     require("mcp", "mcp", "mcp")
     os.chdir(root)
     with contextlib.ExitStack() as stack:
@@ -67,6 +71,7 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
     """Return a server for a folder, which is the current one."""
     from mcp.server import MCPServer
     from mcp.server.mcpserver import Image
+    from mcp.server.mcpserver.exceptions import ToolError
 
     from rendergraph.version import __version__
 
@@ -77,7 +82,10 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
     tool = made.tool(structured_output=False)
 
     async def drawn(work: Callable[[], T]) -> T:
-        return await asyncio.get_running_loop().run_in_executor(worker, _told(work))
+        try:
+            return await asyncio.get_running_loop().run_in_executor(worker, work)
+        except (RendergraphError, KeyError) as error:  # what an assistant reads: the place of each mistake
+            raise ToolError(str(error)) from None
 
     @tool
     async def nodes() -> str:
@@ -149,7 +157,8 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
         def work() -> list[Any]:
             from rendergraph.cli.compare import comparison_text
             from rendergraph.compare import compare
-            from rendergraph.images import picture_bytes, viewable
+            from rendergraph.compare.report.html import eight_bit
+            from rendergraph.images import Shown
 
             each = settings or [[] for _ in pipelines]
             if len(each) != len(pipelines):
@@ -157,9 +166,8 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
             given = [_pipeline(root, name, own, size) for name, own in zip(pipelines, each, strict=True)]
             against = None if reference is None else _pipeline(root, reference, (), size)
             found = compare(given, against, frames=3)
-            words = {"display": "display_color", "linear": "radiance"}
-            pictures = [viewable(r.pixels, words.get(r.encoding, "any")) for r in found if r.pixels is not None]
-            data = [picture_bytes((Path("x.png"), pixels, None, "data", False), {}) for pixels in pictures[:6]]
+            pictures = [eight_bit(each.pixels, each.encoding) for each in found if each.pixels is not None]
+            data = [Shown("", pixels).png for pixels in pictures[:6]]
             return [comparison_text(found), *(Image(data=one, format="png") for one in data)]
 
         return await drawn(work)
@@ -183,33 +191,20 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
     return made
 
 
-def _told(work: Callable[[], T]) -> Callable[[], T]:
-    """Return work whose mistakes are an error that an assistant reads: the message with the place of each."""
-    from mcp.server.mcpserver.exceptions import ToolError
-
-    def told() -> T:
-        try:
-            return work()
-        except (RendergraphError, KeyError) as error:
-            raise ToolError(str(error)) from None
-
-    return told
-
-
 def _verb(*words: str, text: str = "") -> str:
     """Run a verb and return what it prints; of a text with several lines, which it reads from standard input."""
     from mcp.server.mcpserver.exceptions import ToolError
 
     from rendergraph.cli.app import main
 
-    out, error, stdin = io.StringIO(), io.StringIO(), sys.stdin
+    out, stdin = io.StringIO(), sys.stdin
     try:
         sys.stdin = io.TextIOWrapper(io.BytesIO(text.encode()))
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
             code = main(list(words))
     finally:
         sys.stdin = stdin
-    printed = "\n".join(filter(None, (out.getvalue().rstrip("\n"), error.getvalue().rstrip("\n"))))
+    printed = out.getvalue().rstrip("\n")
     if code:
         raise ToolError(printed)
     return printed
@@ -244,7 +239,7 @@ def _inside(root: Path, *texts: str) -> list[str]:
 def _check(root: Path, word: str) -> Path:
     path = (root / Path(word).expanduser()).resolve()
     if not path.is_relative_to(root.resolve()):
-        raise InputError(Problem("RG012", f"'{word}' lies outside the folder of this server, {json.dumps(str(root))}"))
+        raise InputError(Problem("RG012", f"'{word}' lies outside the folder of this server, '{root}'"))
     return path
 
 
