@@ -9,7 +9,6 @@ import numpy.typing as npt
 from msgspec import Struct
 
 from rendergraph.errors import Place
-from rendergraph.scene.rig import placements, slerp
 
 Doubles: TypeAlias = npt.NDArray[np.float64]
 Ease: TypeAlias = Literal["linear", "smooth", "step"]
@@ -45,6 +44,8 @@ class Curve(Struct, frozen=True, eq=False):
         t = {"linear": t, "smooth": t * t * (3 - 2 * t), "step": 0.0}[self.ease]
         a, b = self.values[first], self.values[last]
         if self.turns:
+            from rendergraph.scene.rig import placements, slerp  # few scenes have rotations
+
             rotation = slerp(a[None], b[None], t)
             return placements(np.zeros((1, 3)), rotation, np.ones((1, 3)))[0, :3, :3]
         value = a + t * (b - a)

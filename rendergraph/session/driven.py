@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rendergraph.compile import Executable
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.link import Graph
 from rendergraph.scene.curves import Curve
 from rendergraph.scene.model import Scene
+
+if TYPE_CHECKING:
+    from rendergraph.compile import Executable
 
 
 def checked(graph: Graph, scene: Scene) -> list[Problem]:

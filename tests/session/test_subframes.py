@@ -106,6 +106,19 @@ def test_histories_advance_once_a_frame(gl: rg.Session, scene: Path) -> None:
     assert [float(frame["aa.history"][-1, -1, 3]) for frame in frames] == [1, 2, 3]
 
 
+def test_the_picture_is_jittered_once_a_frame(gl: rg.Session, scene: Path) -> None:
+    """What stands still is where it is without moments, in every frame."""
+    post = "  post: {shape: box, size: [0.3, 4, 0.3], at: [2.2, 0, -1], rotate_degrees: [0, 0, 25], material: grey}\n"
+    scene.write_text(SCENE.replace("  ball:", post + "  ball:"))
+    pipeline = rg.load("taa", scene=scene, size=SIZE)
+    one, many = (
+        [frame["gbuffer.depth"][:, 44:] for frame in gl.frames(pipeline, **options, taps=["gbuffer.depth"])]
+        for options in ({"frames": range(1, 4)}, {"frames": range(1, 4), "subframes": 3})
+    )
+    assert (one[2] != one[1]).any()
+    np.testing.assert_array_equal(many, one)
+
+
 def test_bad_numbers(scene: Path) -> None:
     with pytest.raises(UsageError, match="subframes: expected a number from 1 to 4096, got 0"):
         rg.load("forward", scene=scene).expand(subframes=0)

@@ -117,6 +117,19 @@ def test_a_uniform_motion_is_the_box_filter_of_the_shutter(session: rg.Session, 
     assert found.max() <= 0.9 + 1e-6
 
 
+def test_an_edge_is_a_ramp_on_both_sides(session: rg.Session, tmp_path: Path) -> None:
+    """Of a nearer surface that moves, also where it reaches into the tile beside it, in which nothing else moves."""
+    walls = "far: {shape: box, size: [400, 40, 1], at: [0, 0, -3]}\n  near: {shape: box, size: [200, 40, 1], at: [100, 0, -1]}"
+    cameras = SCENE[SCENE.index("lights:") :]
+    (tmp_path / "scene.yaml").write_text(f"scene: 1\nobjects:\n  {walls}\n{cameras}")
+    half = "    float on = step(96.0, gl_FragCoord.x);\n    picture = vec4(vec3(on), 1.0);\n    velocity = vec2(0.25 * on, 0.0);\n}"
+    (tmp_path / "fed.frag").write_text(PICTURE[: PICTURE.index("    float x")] + half)
+    (tmp_path / "fed.yaml").write_text(FED.replace("PARAMS", "{samples: 96, radius: 0.25, jitter: 0}"))
+    found = session.render(rg.load(tmp_path / "fed.yaml").select(shutter=0.25))["radiance"][12, :, 0]
+    expected = np.clip(0.5 + (np.arange(192) + 0.5 - 96) / 12, 0, 1)  # 12 pixels of motion while the shutter is open
+    assert np.abs(found - expected).max() < 0.06
+
+
 def test_without_a_shutter_it_costs_nothing(session: rg.Session, tmp_path: Path) -> None:
     pipeline = with_scene(tmp_path, MOVING).select(shutter=0.0)
     plain = pipeline.set("blur.enabled", False)
