@@ -43,7 +43,7 @@ _MOST_PARTS = 64
 
 
 _OF_INSTANCES = {
-    **dict.fromkeys(("scene_instance_block", "scene_vertex_block", "scene_tree_block"), "instances"),
+    **dict.fromkeys(("scene_instance_block", "scene_vertex_block"), "instances"),
     **dict.fromkeys(("scene_previous_block", "scene_previous_position_block"), "instances before"),
 }
 """Blocks of the scene's data that change with other sources."""
@@ -394,6 +394,8 @@ class Executable(Struct, eq=False, dict=True):
             sources |= {("step", step.key), *(("buffer", id) for id in touched_ids(step))}
             if step.kind == "geometry":
                 sources |= {"instances", ("view", step.view or "")}
+            if any("scene_tree" in draw.program.uniforms for draw in compiled.all_draws):
+                sources.add("instances")
             if any(name in draw.program.object for draw in compiled.all_draws for name in PREVIOUS_ATTRIBUTES):
                 sources.add("instances before")
             if step.region is not None:

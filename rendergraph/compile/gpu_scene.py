@@ -99,6 +99,7 @@ class GpuScene(Struct, eq=False, dict=True):
     _before: moderngl.Buffer | None = None
     _data: SceneBuffers | None = None
     _tree: tuple[MeshTrees, moderngl.Buffer] | None = None
+    _tree_texture: int = 0
     _posing: Posing | None = None
     _stale_instances: set[int] = set()  # objects that have moved since the frame before was kept
 
@@ -210,19 +211,23 @@ class GpuScene(Struct, eq=False, dict=True):
                 self._posing.fill(vertices, vertices.size // (4 * len(self.packed.positions)))
         return self._data
 
-    def tree(self) -> moderngl.Buffer:
+    def tree(self) -> int:
         """The trees for `trace.glsl`, built when a program first looks at them."""
         if self._tree is None:
             trees = self._mesh_trees()
             rows = object_rows(self.packed, self.data.instances["flags"], trees)
             check_size(self.device, "scene_tree_block", rows.nbytes + trees.rows.nbytes)
             self._tree = trees, self.device.ctx.buffer(rows.tobytes() + trees.rows.tobytes())
-        return self._tree[1]
+            raw = self.device.raw
+            self._tree_texture = raw.make("glCreateTextures", 0x8C2A)
+            raw.glTextureBuffer(self._tree_texture, 0x8D82, self._tree[1].glo)
+        return self._tree_texture
 
     def _mesh_trees(self) -> MeshTrees:
         posing = self._posing
         packed = self.packed if posing is None else replace(self.packed, positions=posing.positions())
-        return mesh_trees(self.scene, packed)
+        before = None if self._tree is None else self._tree[0]
+        return mesh_trees(self.scene, packed, self.data.instances["flags"], before)
 
     @property
     def data_defines(self) -> dict[str, str]:

@@ -367,9 +367,6 @@ class _Compiler(Struct, eq=False, dict=True):
         if step.reads_scene:
             used = {name for text in texts().values() for _, name, _ in declared_blocks(text.text)}
             held = dict(self.scene.data.buffers)
-            if "scene_tree_block" in used:
-                check_scene_includes(step, texts(), self.types)
-                held["scene_tree_block"] = self.scene.tree()
             if "scene_previous_block" in used:
                 held["scene_previous_block"] = self.scene.previous()
                 held["scene_previous_position_block"] = self.scene.previous_positions()
@@ -400,6 +397,10 @@ class _Compiler(Struct, eq=False, dict=True):
             sampled.add(name)
             if name in program.uniforms:
                 uniforms[name] = self.units.unit((texture.glo,), self.scene.data.sampler, binds)
+        if "scene_tree" in program.uniforms:
+            check_scene_includes(step, texts(), self.types)
+            sampled.add("scene_tree")
+            uniforms["scene_tree"] = self.units.unit((self.scene.tree(),), 0, binds)
         cls, resources, sampled = self.types[step.node].cls, self.plan.resources, {*sampled, *materials}
         check_kept_text(step, texts, cls, resources)
         check_program(step, program, texts, resources, uniforms, blocks, sampled, cls)

@@ -1,4 +1,8 @@
-"""The buffer behind `trace.glsl`: trees over the triangles of each mesh, and one over the objects. No GL.
+"""The buffer behind `trace.glsl`: trees over the triangles of meshes, and one over the objects. No GL.
+
+Objects that never move share one tree over all their triangles in world space, because where boxes of objects overlap,
+a ray has to enter one object after the other. It stands in the tree over objects as one object more. The others have
+the tree of their mesh.
 
 The buffer consists of rows of four 32-bit words. Boxes are rounded outwards to a grid of 16 bits over the box of
 their tree: a node with the boxes of both children has 32 bytes; a ray is transformed to the grid once a tree.
@@ -8,8 +12,9 @@ An object that is scaled to a plane, whose matrix has no inverse, is traced as a
 | --- | --- |
 | 2 | grid of the tree over objects: origin and root reference, scale and the row where triangles begin |
 | 5 an object | rows of the world-to-object matrix; grid of its mesh: origin and root reference, scale and flags |
+| 5 | the same for the shared tree, whose flags are -1 |
 | 2 a node | least corners of both boxes and the left reference, greatest corners and the right one |
-| 3 a triangle | its corners, and its number within the mesh |
+| 3 a triangle | its corners; its number within the mesh, in the shared tree its object and the flags of that, else -1 |
 
 Corners of two boxes share words; the left one has the lower 16 bits. A reference is a row, or below 0 a leaf:
 `-1 - object` in the tree over objects, and `leaf(first, count)` of triangles otherwise.
@@ -17,14 +22,14 @@ Corners of two boxes share words; the left one has the lower 16 bits. A referenc
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
 
 from rendergraph.scene.bvh import LEAF, Tree, build, depth_limit, refit, triangle_boxes
-from rendergraph.scene.model import Floats, Matrix, Scene
+from rendergraph.scene.model import Floats, Matrix, Placement, Scene
 from rendergraph.scene.pack import PackedScene
 
 Rows: TypeAlias = npt.NDArray[np.int32]
@@ -34,55 +39,111 @@ _MARGIN = 0.02  # cells that boxes are larger, for the rounding of rays
 _HEADER, _OBJECT, _NODE, _TRIANGLE = 2, 5, 2, 3  # rows
 _NOTHING = 0x7FFFFFFF  # the root reference of an empty tree
 _THINNEST = 1e-6  # thickness of an object that is scaled to a plane, relative to its size
+_FINEST = 8  # cells of the shared tree's grid that the triangles of an object in it measure at least
+_MOST_COPIES = 1 << 17  # triangles of the shared tree that are there several times
+
+_Shape: TypeAlias = tuple[Floats, npt.NDArray[np.uint32]]
+"""Positions (v, 3) and triangles (t, 3)."""
 
 
 class MeshTrees(Struct, frozen=True, eq=False):
-    """The part of the buffer that stays as it is while objects move.
+    """The part of the buffer that stays as it is while objects move. The shared tree follows those of m meshes.
 
     Attributes:
-        rows: nodes and triangles of all meshes.
-        grids: float32 (m, 2, 3), origin and scale of each mesh's grid.
-        roots: int32 (m,), references to each mesh's topmost node.
+        rows: nodes and triangles of all trees.
+        grids: float32 (m + 1, 2, 3), origin and scale of each tree's grid.
+        roots: int32 (m + 1,), references to each tree's topmost node.
         triangles_at: the row of the buffer where triangles begin.
+        shared: bool (n,), which objects are in the shared tree.
+        box: float32 (2, 3), its corners.
+        tree: the shared tree.
     """
 
     rows: Rows
     grids: Floats
     roots: npt.NDArray[np.int32]
     triangles_at: int
+    shared: npt.NDArray[np.bool_]
+    box: Floats
+    tree: Tree
 
 
 def first_rows(objects: int) -> int:
     """Return the number of rows before those of meshes."""
-    return _HEADER + _OBJECT * objects + _NODE * max(objects - 1, 0)
+    return _HEADER + _OBJECT * (objects + 1) + _NODE * objects
 
 
 def most_bytes(objects: int, triangles: int) -> int:
     """Return a limit of the buffer's bytes, known before any tree is built; `triangles` of all meshes."""
-    return 16 * (first_rows(objects) + (_NODE + _TRIANGLE) * triangles)
+    return 16 * (first_rows(objects) + (_NODE + _TRIANGLE) * (triangles + _MOST_COPIES * (objects > 1)))
 
 
 def stack_size(scene: Scene) -> int:
     """Return how many entries a traversal needs at most, known before any tree is built."""
-    largest = max((len(mesh.indices) for mesh in scene.meshes), default=0)
-    return depth_limit(len(scene.objects)) + depth_limit(largest) + 3  # the end, the way back to the objects, one more
+    triangles = sum(len(mesh.indices) for mesh in scene.meshes) + _MOST_COPIES
+    return depth_limit(len(scene.objects)) + depth_limit(triangles) + 3  # the end, the way back to the objects, one more
 
 
-def mesh_trees(scene: Scene, packed: PackedScene) -> MeshTrees:
-    """Build the trees of meshes that have none yet, all at once, and lay all of them out; meshes keep their trees."""
-    meshes = scene.meshes
-    shapes = []
+def _moving(scene: Scene) -> set[int]:
+    """The objects that are elsewhere or have another shape at another time."""
+    names = {rest.rpartition(".")[0] for kind, _, rest in (p.partition(".") for p in scene.keyframes) if kind == "objects"}
+    for name in list(names):
+        if (copies := scene.copies.get(("objects", name))) is not None:
+            names.update(f"{name}.{number}" for number in range(len(copies.offsets)))
+    names.update(name for rig in scene.rigs for name, _ in rig.placements)
+    return {number for name in names for number, _ in scene.placements.get(name, Placement()).objects}
+
+
+def _shared(scene: Scene, packed: PackedScene) -> npt.NDArray[np.bool_]:
+    """Which objects share a tree (n,): those that stay where they are, and that its grid can tell apart.
+
+    Of meshes with several objects, the smallest are copied.
+    """
+    counts = packed.meshes["count"][packed.object_mesh] // 3
+    found = ~packed.hidden & (counts > 0)
+    found[list(_moving(scene))] = False
+    found[[placed.pose is not None for placed in scene.objects]] = False
+    if found.any():
+        low, high = packed.centers - packed.extents, packed.centers + packed.extents
+        cell = float((high[found].max(axis=0) - low[found].min(axis=0)).max()) / _CELLS
+        found &= packed.extents.max(axis=1) * 2 >= _FINEST * cell * np.sqrt(counts)
+    uses = np.bincount(packed.object_mesh, minlength=len(scene.meshes))[packed.object_mesh]
+    several = np.flatnonzero(found & (uses > 1))
+    ranked = several[np.argsort(counts[several], kind="stable")]
+    found[ranked[np.cumsum(counts[ranked]) > _MOST_COPIES]] = False
+    return found
+
+
+def mesh_trees(
+    scene: Scene, packed: PackedScene, flags: npt.NDArray[np.int32], before: MeshTrees | None = None
+) -> MeshTrees:
+    """Build the trees that do not exist yet, all at once, and lay all of them out; meshes keep their trees.
+
+    Args:
+        scene: with the meshes.
+        packed: the scene, with positions as they are now.
+        flags: int32 (n,), the flags of each object's `SceneInstance`.
+        before: what this returned when animated meshes had another pose.
+    """
+    shared = _shared(scene, packed)
+    held: list[dict[str, Any]] = [mesh.__dict__ for mesh in scene.meshes]
+    held.append({} if before is None else {"tree": before.tree})
+    shapes: list[_Shape] = []
     for record in packed.meshes:
         indices = packed.indices[record["first_index"] :][: record["count"]].reshape(-1, 3)
         shapes.append((packed.positions[record["base_vertex"] :][: record["vertices"]], indices))
-    missing = [number for number, mesh in enumerate(meshes) if "tree" not in mesh.__dict__]
+    needed = {*packed.object_mesh[~shared & ~packed.hidden].tolist(), len(scene.meshes)}
+    numbers = np.flatnonzero(shared)
+    shapes.append(_in_world(packed, shapes, numbers))
+    missing = [number for number in needed if "tree" not in held[number]]
     if missing:
         boxes = np.concatenate([triangle_boxes(*shapes[number]) for number in missing], axis=1)
         built = build(boxes, [len(shapes[number][1]) for number in missing])
         for number, tree in zip(missing, built, strict=True):
-            meshes[number].__dict__["tree"] = tree
-    trees: list[Tree] = [mesh.__dict__["tree"] for mesh in meshes]
-    for number in packed.vertex_orders:  # animated meshes may be in another pose by now
+            held[number]["tree"] = tree
+    empty = Tree(np.zeros((0, 2, 6), np.float32), np.zeros((0, 2), np.int32), np.zeros(0, np.int32), 0, 0)
+    trees: list[Tree] = [one["tree"] if n in needed else empty for n, one in enumerate(held)]
+    for number in packed.vertex_orders.keys() & needed:  # animated meshes may be in another pose by now
         trees[number] = refit(trees[number], triangle_boxes(*shapes[number]))
     at, first = first_rows(len(scene.objects)), 0
     parts, grids, roots = [np.zeros((0, 4), np.int32)], np.ones((len(trees), 2, 3), np.float32), []
@@ -91,12 +152,31 @@ def mesh_trees(scene: Scene, packed: PackedScene) -> MeshTrees:
         parts.append(_node_rows(tree.boxes, _references(tree.children, at, first), grids[number]))
         roots.append(int(_references(np.array(tree.root), at, first)))
         at, first = at + len(parts[-1]), first + len(tree.order)
-    for tree, (positions, triangles) in zip(trees, shapes, strict=True):
-        rows = np.zeros((len(tree.order), _TRIANGLE, 4), np.int32)
+    counts = packed.meshes["count"][packed.object_mesh[numbers]].astype(np.int64) // 3
+    for number, (tree, (positions, triangles)) in enumerate(zip(trees, shapes, strict=True)):
+        rows = np.full((len(tree.order), _TRIANGLE, 4), -1, np.int32)
         rows[:, :, :3] = positions[triangles[tree.order]].view(np.int32)
         rows[:, 0, 3] = tree.order
+        if number == len(scene.meshes):
+            rows[:, 0, 3] -= np.repeat(np.cumsum(counts) - counts, counts)[tree.order]
+            rows[:, 1, 3] = np.repeat(numbers, counts)[tree.order]
+            rows[:, 2, 3] = flags[rows[:, 1, 3]]
         parts.append(rows.reshape(-1, 4))
-    return MeshTrees(np.concatenate(parts), grids, np.array(roots, np.int32), at)
+    corners = shapes[-1][0]
+    box = np.stack([corners.min(axis=0), corners.max(axis=0)]) if len(corners) else np.zeros((2, 3), np.float32)
+    return MeshTrees(np.concatenate(parts), grids, np.array(roots, np.int32), at, shared, box, trees[-1])
+
+
+def _in_world(packed: PackedScene, shapes: list[_Shape], objects: npt.NDArray[np.int64]) -> _Shape:
+    """All triangles of some objects in world space, one object after the other."""
+    positions, triangles, first = [np.zeros((0, 3), np.float32)], [np.zeros((0, 3), np.uint32)], 0
+    for number in objects:
+        local, indices = shapes[packed.object_mesh[number]]
+        rows = packed.instances["rows"][number].astype(np.float64)
+        positions.append((local @ rows[:, :3].T + rows[:, 3]).astype(np.float32))
+        triangles.append(indices + np.uint32(first))
+        first += len(local)
+    return np.concatenate(positions), np.concatenate(triangles)
 
 
 def object_rows(packed: PackedScene, flags: npt.NDArray[np.int32], trees: MeshTrees) -> Rows:
@@ -110,17 +190,19 @@ def object_rows(packed: PackedScene, flags: npt.NDArray[np.int32], trees: MeshTr
     count = len(packed.object_mesh)
     rows = np.zeros((first_rows(count), 4), np.int32)
     inverse, has_extent = _inverses(packed)
-    objects = rows[_HEADER : _HEADER + _OBJECT * count].reshape(count, _OBJECT, 4)
-    objects[:, :3] = inverse.astype(np.float32).view(np.int32)
-    grids = trees.grids[packed.object_mesh]
-    objects[:, 3:, :3] = grids.view(np.int32)
-    objects[:, 3, 3], objects[:, 4, 3] = trees.roots[packed.object_mesh], flags
-    used = np.flatnonzero(has_extent & ~packed.hidden & (packed.meshes["count"][packed.object_mesh] > 0))
+    objects = rows[_HEADER : _HEADER + _OBJECT * (count + 1)].reshape(count + 1, _OBJECT, 4)
+    objects[:, :3] = np.concatenate([inverse, np.eye(3, 4)[None]]).astype(np.float32).view(np.int32)
+    tree_of = np.append(packed.object_mesh, len(trees.roots) - 1)
+    objects[:, 3:, :3] = trees.grids[tree_of].view(np.int32)
+    objects[:, 3, 3], objects[:, 4, 3] = trees.roots[tree_of], np.append(flags, -1)
+    is_used = has_extent & ~packed.hidden & (packed.meshes["count"][packed.object_mesh] > 0) & ~trees.shared
+    used = np.flatnonzero(np.append(is_used, trees.shared.any()))
     low, high = packed.centers - packed.extents - packed.slack, packed.centers + packed.extents + packed.slack
+    low, high = np.concatenate([low, trees.box[:1]]), np.concatenate([high, trees.box[1:]])
     boxes = np.concatenate([low[used], -high[used]], axis=1).T
     rounded = np.ascontiguousarray(np.nextafter(boxes.astype(np.float32), np.float32(-np.inf)))
     (tree,) = build(rounded, [len(used)], 1)
-    at = _HEADER + _OBJECT * count
+    at = _HEADER + _OBJECT * (count + 1)
     grid = _grid(tree.boxes)
     rows[at : at + _NODE * len(tree.boxes)] = _node_rows(tree.boxes, _objects(tree.children, at, tree, used), grid)
     rows[:_HEADER, :3] = grid.view(np.int32)

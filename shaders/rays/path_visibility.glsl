@@ -19,10 +19,12 @@ float opacity(int instance, int triangle, vec2 barycentrics) {
 float visibility(vec3 origin, vec3 direction, float farthest, int wanted) {
     Hit hit;
 #if defined(SCENE_ANY_MASKED) || defined(SCENE_ANY_BLENDED)
+    const int PASSING = SCENE_MASKED | SCENE_BLENDED;
     float passed = 1.0, nearest = 0.0;
-    while (passed > 0.0 && trace(origin, direction, nearest, farthest, wanted, 0, false, hit)) {
+    bool ends;
+    while (passed > 0.0 && trace(origin, direction, nearest, farthest, wanted, 0, true, PASSING, hit, ends)) {
         nearest = hit.distance;
-        passed *= 1.0 - opacity(hit.instance, hit.triangle, hit.barycentrics);
+        passed *= ends ? 0.0 : 1.0 - opacity(hit.instance, hit.triangle, hit.barycentrics);
     }
     return passed;
 #else
