@@ -88,13 +88,15 @@ bool trace(
             node = is_wanted ? low.w : next;
         }
         do {
+            int next; vec3 a,b,c,d;
+            for (int k = 0; k < 2; ++k) {
             bool is_inner = uint(node) < uint(TRACE_UP);
             int row = is_inner ? node : 0;
             ivec4 low = SCENE_TREE(row), high = SCENE_TREE(row + 1);
-            vec3 a = (vec3(low.xyz & 0xFFFF) - grid_origin) * inverse;
-            vec3 b = (vec3(high.xyz & 0xFFFF) - grid_origin) * inverse;
-            vec3 c = (vec3((low.xyz >> 16) & 0xFFFF) - grid_origin) * inverse;
-            vec3 d = (vec3((high.xyz >> 16) & 0xFFFF) - grid_origin) * inverse;
+            a = (vec3(low.xyz & 0xFFFF) - grid_origin) * inverse;
+            b = (vec3(high.xyz & 0xFFFF) - grid_origin) * inverse;
+            c = (vec3((low.xyz >> 16) & 0xFFFF) - grid_origin) * inverse;
+            d = (vec3((high.xyz >> 16) & 0xFFFF) - grid_origin) * inverse;
             vec3 enter = min(a, b), leave = max(a, b);
             float left_enter = max(max(enter.x, enter.y), max(enter.z, nearest));
             float left_leave = min(min(leave.x, leave.y), min(leave.z, reach));
@@ -105,10 +107,11 @@ bool trace(
             bool left = left_enter <= left_leave * 1.000001, right = right_enter <= right_leave * 1.000001;
             bool right_first = right && (!left || right_enter < left_enter);
             stack[top] = right_first ? low.w : high.w;
-            int next = stack[top - 1];
+            next = stack[top - 1];
             next = left || right ? (right_first ? high.w : low.w) : next;
             top += !is_inner ? 0 : left && right ? 1 : left || right ? 0 : -1;
             node = is_inner ? next : node;
+            }
 
             bool is_leaf = node < 0 && in_mesh;
             int leaf = is_leaf ? -1 - node : 0, at = header2.w + 3 * (leaf >> 2);

@@ -46,7 +46,14 @@ vec3 meet_catcher(
     inout CaughtPath caught, inout Surface s, int instance, vec3 direction, int vertex, float density, float chance) {
     vec3 sum = vec3(0.0), shown;
     bool is_plain;
-    if (caught.leaves && is_wanted(vertex - 1)) sum -= light_behind(direction, false, density, chance);
+    if (caught.leaves && is_wanted(vertex - 1)) {
+#ifdef USES_ENVIRONMENT
+        vec3 sky = light_from(direction, -1e-6);
+        sum -= light_behind(sky, environment_density(direction), false, density, chance);
+#else
+        sum -= light_behind(vec3(0.0), 0.0, false, density, chance);
+#endif
+    }
     caught.leaves = catches_path(s, instance, vertex == 0, is_plain, shown);
     caught.is_plain = caught.is_plain || is_plain;
     if (caught.leaves && is_wanted(vertex)) sum += shown;

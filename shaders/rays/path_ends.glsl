@@ -4,18 +4,17 @@
 uniform vec3 ambient;
 uniform vec3 background;
 
-// Radiance from behind all surfaces. Rays of the camera see the background. Others have found the environment by
-// themselves, with a density, where it had a chance to be chosen before.
-vec3 light_behind(vec3 direction, bool is_camera, float density, float chance) {
+// Radiance from behind all surfaces, where the environment has the radiance `sky` and is chosen with `sky_density`. Rays
+// of the camera see the background. Others have found the environment by themselves, with a density, where it had a
+// chance to be chosen before.
+vec3 light_behind(vec3 sky, float sky_density, bool is_camera, float density, float chance) {
 #ifdef SHOWS_ENVIRONMENT
-    if (is_camera) return light_from(direction, -1e-6);
+    if (is_camera) return sky;
 #elif defined(USES_SKY)
     if (is_camera) return background;
 #endif
 #ifdef USES_ENVIRONMENT
-    if (!is_camera) {
-        return light_from(direction, -1e-6) * power_heuristic(density, chance * environment_density(direction));
-    }
+    if (!is_camera) return sky * power_heuristic(density, chance * sky_density);
 #elif defined(USES_SKY) && !defined(HAS_ENVIRONMENT)
     if (!is_camera) return ambient;
 #endif

@@ -62,26 +62,27 @@ vec3 source_chances(vec3 position, float lights) {
     return sum > 0.0 ? 0.85 * chances / sum + 0.15 * is_there / count : vec3(0.0);
 }
 
-// Light of one source at a surface, which a shadow ray has still to reach.
+// A point or direction of one source of light, which a shadow ray has still to reach.
 struct SourceSample {
-    vec3 reflected;  // towards the viewer, over the density of the choice and weighted
-    vec3 direction;
-    float reach;     // length of the shadow ray in lengths of the direction
+    vec3 light;      // radiance times SPREAD_LIGHT, or the irradiance of a punctual light; over the density of the choice
+    vec3 light_dir;  // unit
+    float density;   // of the choice in 1/sr; 0 for a punctual light, which nothing else finds
+    bool is_environment;  // `light` and `density` still lack the environment's radiance and density
+    vec3 ray;        // the direction of the shadow ray
+    float reach;     // its length in lengths of this direction
     int casting;     // flags of what casts shadows
 };
 
 // Chooses a source by `chances` and a point or direction of it. `origin` is where the shadow ray begins.
 SourceSample sample_source(
     Surface s, vec3 origin, vec3 chances, float choice, int light, float light_chance, uint point, uint dimension) {
-    SourceSample found = SourceSample(vec3(0.0), vec3(0.0), 1e30, 0);
+    SourceSample found = SourceSample(vec3(0.0), s.normal, 0.0, false, vec3(0.0), 1e30, 0);
     if (choice < chances.x) {
 #ifdef USES_LIGHTS
-        vec3 irradiance = irradiance_from(lights[light], s.position, found.direction);
-        found.reflected = reflected_part(s, found.direction) * irradiance / (chances.x * light_chance);
-        if (lights[light].position.w > 0.0) {
-            found.direction = lights[light].position.xyz - origin;
-            found.reach = 1.0;
-        }
+        found.light = irradiance_from(lights[light], s.position, found.light_dir) / (chances.x * light_chance);
+        bool has_position = lights[light].position.w > 0.0;
+        found.ray = has_position ? lights[light].position.xyz - origin : found.light_dir;
+        found.reach = has_position ? 1.0 : found.reach;
         found.casting = SCENE_CASTS_SHADOW;
 #endif
     } else if (choice < chances.x + chances.y) {
@@ -89,11 +90,9 @@ SourceSample sample_source(
         ivec2 size = textureSize(environment_table, 0);
         vec2 xi = sobol_point(point, dimension + 0x200000u);
         ivec2 cell = sample_texel(environment_tree, size, xi);
-        found.direction = table_direction((vec2(cell) + xi) / vec2(size));
-        float chosen = chances.y * environment_density(found.direction);
-        float weight = power_heuristic(chosen, direction_density(s, found.direction));
-        vec3 radiance = light_from(found.direction, -1e-6) * (SPREAD_LIGHT * weight / max(chosen, 1e-37));
-        if (chosen > 0.0) found.reflected = reflected_part(s, found.direction) * radiance;
+        found.light_dir = table_direction((vec2(cell) + xi) / vec2(size));
+        found.ray = found.light_dir;
+        found.is_environment = true;
 #endif
     } else if (chances.z > 0.0) {
 #ifdef USES_EMITTERS
@@ -110,17 +109,16 @@ SourceSample sample_source(
             normal = -normal;
             facing = -facing;
         }
-        vec3 to_emitter = offset * inversesqrt(square);
         float area = 0.5 * length(cross(corners[1] - corners[0], corners[2] - corners[0]));
         float chance = texelFetch(emitter_table, cell, 0).w / max(emitted_power(), 1e-37);
-        float chosen = chances.z * chance / max(area, 1e-37) * square / max(facing, 1e-9);
-        float weight = power_heuristic(chosen, direction_density(s, to_emitter));
+        found.light_dir = offset * inversesqrt(square);
+        found.density = chances.z * chance / max(area, 1e-37) * square / max(facing, 1e-9);
         if (facing > 0.0 && square > 0.0) {
-            found.reflected = emission(emitter.instance, emitter.triangle, barycentrics) * reflected_part(s, to_emitter)
-                * (SPREAD_LIGHT * weight * opacity(emitter.instance, emitter.triangle, barycentrics)
-                    / max(chosen, 1e-37));
+            found.light = emission(emitter.instance, emitter.triangle, barycentrics)
+                * (SPREAD_LIGHT * opacity(emitter.instance, emitter.triangle, barycentrics)
+                    / max(found.density, 1e-37));
         }
-        found.direction = offset_ray(at, normal) - origin;
+        found.ray = offset_ray(at, normal) - origin;
         found.reach = 1.0;
 #endif
     }

@@ -58,14 +58,16 @@ void main() {
             caught = CaughtPath(false, false);
         }
         uint dimension = random + uint(vertex) * 8u + ahead * 0x10000u;
-        bool ends = true;
+        bool ends = true, reflects = false, by_light = false;
         Hit hit;
-        if (!trace(origin, direction, nearest, farthest, 0, 0, false, hit)) {
-            vec3 behind = behind_catcher(caught, light_behind(direction, vertex == 0, density, chances.y));
-            if (is_wanted(vertex - 1)) radiance += throughput * behind;
-        } else {
+        Surface s;
+        SourceSample source;
+        vec3 start, seen = direction;
+        float shown = 0.0;  // part of the light of the source that a shadow catcher shows already
+        bool is_hit = trace(origin, direction, nearest, farthest, 0, 0, false, hit);
+        if (is_hit) {
             int flags = scene_instances[hit.instance].flags;
-            Surface s = scene_surface(hit.instance, hit.triangle, hit.barycentrics, -direction);
+            s = scene_surface(hit.instance, hit.triangle, hit.barycentrics, -direction);
             vec3 front = scene_geometric_normal(hit.instance, hit.triangle);
             bool is_front = dot(front, direction) < 0.0, is_double_sided = (flags & SCENE_DOUBLE_SIDED) != 0;
             // A back that geometry passes do not show is there for all rays but the camera's.
@@ -80,6 +82,7 @@ void main() {
 #ifdef SCENE_ANY_BLENDED
             passes = passes || unit_float(hash(dimension, point + 77u)) >= s.alpha;
 #endif
+            bool is_unlit = s.lit == 0.0;
             if (passes) {
                 nearest = hit.distance;
                 ++ahead;
@@ -88,7 +91,6 @@ void main() {
                 coverage = 1.0;
                 radiance += throughput * meet_catcher(caught, s, hit.instance, direction, vertex, density, chances.y);
 #ifdef USES_EMISSION
-                bool is_unlit = s.lit == 0.0;
 #ifdef NEEDS_NOTHING
                 is_unlit = true;
 #endif
@@ -100,49 +102,72 @@ void main() {
                         radiance += throughput * s.emissive * weight;
                     }
                 }
-#else
-                bool is_unlit = s.lit == 0.0;
 #endif
-                if (!is_unlit && vertex <= LAST_VERTEX) {
-                    // One source of light and its shadow.
-                    vec2 choice = sobol_point(point, dimension + 0x100000u);
-                    float light_chance, lights_sum;
-                    int light = choose_light(s, choice.y, light_chance, lights_sum);
-                    chances = source_chances(s.position, lights_sum);
-                    vec3 start = offset_ray(s.position, s.geometric_normal);
-                    SourceSample source = sample_source(lit_catcher(caught, s, choice.x < chances.x), start, chances,
-                        choice.x, light, light_chance, point, dimension);
-                    vec3 arriving = source.reflected;
-                    bool reaches = dot(source.direction, s.geometric_normal) > 0.0 && is_wanted(vertex)
-                        && max(max(arriving.x, arriving.y), arriving.z) > 0.0;
-                    float passed = visibility(start, source.direction, reaches ? source.reach : 0.0, source.casting);
-                    passed -= shown_already(caught, choice.x < chances.x + chances.y);
-                    if (reaches) radiance += throughput * arriving * passed;
+                reflects = !is_unlit && vertex <= LAST_VERTEX;
+            }
+            if (reflects) {  // one source of light
+                vec2 choice = sobol_point(point, dimension + 0x100000u);
+                float light_chance, lights_sum;
+                int light = choose_light(s, choice.y, light_chance, lights_sum);
+                chances = source_chances(s.position, lights_sum);
+                start = offset_ray(s.position, s.geometric_normal);
+                shown = shown_already(caught, choice.x < chances.x + chances.y);
+                by_light = choice.x < chances.x;
+                source = sample_source(s, start, chances, choice.x, light, light_chance, point, dimension);
+                seen = source.light_dir;
+            }
+        }
 
-                    // The next ray.
-                    vec2 survival = sobol_point(point, dimension + 0x400000u);
-                    direction = sample_direction(s, vec3(sobol_point(point, dimension + 0x500000u), survival.x));
-                    density = direction_density(s, direction);
-                    bool goes_on = dot(direction, s.geometric_normal) > 0.0 && density > 0.0;
-                    throughput *= reflected_part(s, direction) * (SPREAD_LIGHT / max(density, 1e-37));
-                    float strongest = max(max(throughput.x, throughput.y), throughput.z);
-                    if (vertex >= 3) {  // Russian roulette
-                        float survives = min(strongest, 0.95);
-                        goes_on = goes_on && survival.y < survives;
-                        throughput /= max(survives, 1e-6);
-                    }
-                    goes_on = goes_on && strongest > 0.0;
-#ifndef FOLLOWS_LAST
-                    goes_on = goes_on && vertex < LAST_VERTEX;
+        // The environment, where a ray has found it or where it is the source.
+        vec3 sky = vec3(0.0);
+        float sky_density = 0.0;
+#if defined(SHOWS_ENVIRONMENT) || defined(USES_ENVIRONMENT)
+        sky = light_from(seen, -1e-6);
 #endif
-                    if (goes_on) {
-                        origin = start;
-                        nearest = 0.0;
-                        farthest = 1e30;
-                        ++vertex;
-                        ends = false;
-                    }
-                }
+#ifdef USES_ENVIRONMENT
+        sky_density = environment_density(seen);
+#endif
+        if (!is_hit) {
+            vec3 behind =
+                behind_catcher(caught, light_behind(sky, sky_density, vertex == 0, density, chances.y));
+            if (is_wanted(vertex - 1)) radiance += throughput * behind;
+        }
+        if (reflects) {
+            if (source.is_environment) {
+                source.density = chances.y * sky_density;
+                source.light = source.density > 0.0 ? sky * (SPREAD_LIGHT / source.density) : vec3(0.0);
+            }
+            vec3 arriving = source.light * reflected_part(lit_catcher(caught, s, by_light), source.light_dir);
+            if (source.density > 0.0) {
+                arriving *= power_heuristic(source.density, direction_density(s, source.light_dir));
+            }
+            bool reaches = dot(source.ray, s.geometric_normal) > 0.0 && is_wanted(vertex)
+                && max(max(arriving.x, arriving.y), arriving.z) > 0.0;
+            float passed = visibility(start, source.ray, reaches ? source.reach : 0.0, source.casting) - shown;
+            if (reaches) radiance += throughput * arriving * passed;
+
+            // The next ray.
+            vec2 survival = sobol_point(point, dimension + 0x400000u);
+            direction = sample_direction(s, vec3(sobol_point(point, dimension + 0x500000u), survival.x));
+            density = direction_density(s, direction);
+            bool goes_on = dot(direction, s.geometric_normal) > 0.0 && density > 0.0;
+            throughput *= reflected_part(s, direction) * (SPREAD_LIGHT / max(density, 1e-37));
+            float strongest = max(max(throughput.x, throughput.y), throughput.z);
+            if (vertex >= 3) {  // Russian roulette
+                float survives = min(strongest, 0.95);
+                goes_on = goes_on && survival.y < survives;
+                throughput /= max(survives, 1e-6);
+            }
+            goes_on = goes_on && strongest > 0.0;
+#ifndef FOLLOWS_LAST
+            goes_on = goes_on && vertex < LAST_VERTEX;
+#endif
+            if (goes_on) {
+                origin = start;
+                nearest = 0.0;
+                farthest = 1e30;
+                ++vertex;
+                ends = false;
             }
         }
         if (ends) {
