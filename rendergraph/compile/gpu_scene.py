@@ -65,6 +65,7 @@ SCENE_ATTRIBUTES = {
 """What a vertex shader that draws the scene may read, with moderngl's formats."""
 _SECTIONS = {"objects": "instances", "materials": "material_block", "lights": "light_block"}
 """Sections of scene files with what changes where values of plugins' keys change."""
+_TEXTURE_BUFFER, _RGBA32I = 0x8C2A, 0x8D82
 _MOST_RUNS = 32  # of neighbouring records that are uploaded one by one; what lies between them goes along beyond
 _PADDING = {"4f": "16x", "2i": "8x"}
 
@@ -211,17 +212,19 @@ class GpuScene(Struct, eq=False, dict=True):
                 self._posing.fill(vertices, vertices.size // (4 * len(self.packed.positions)))
         return self._data
 
-    def tree(self) -> int:
-        """The trees for `trace.glsl`, built when a program first looks at them."""
+    def tree(self) -> tuple[moderngl.Buffer, int]:
+        """The trees for `trace.glsl` and the GL texture that fetches from them, built when a program first looks at them.
+
+        Software rasterisers fetch texels in a third of the time that elements of a storage block take them.
+        """
         if self._tree is None:
             trees = self._mesh_trees()
             rows = object_rows(self.packed, self.data.instances["flags"], trees)
-            check_size(self.device, "scene_tree_block", rows.nbytes + trees.rows.nbytes)
+            check_size(self.device, "scene_tree", rows.nbytes + trees.rows.nbytes, texel=16)
             self._tree = trees, self.device.ctx.buffer(rows.tobytes() + trees.rows.tobytes())
-            raw = self.device.raw
-            self._tree_texture = raw.make("glCreateTextures", 0x8C2A)
-            raw.glTextureBuffer(self._tree_texture, 0x8D82, self._tree[1].glo)
-        return self._tree_texture
+            self._tree_texture = self.device.raw.make("glCreateTextures", _TEXTURE_BUFFER)
+            self.device.raw.glTextureBuffer(self._tree_texture, _RGBA32I, self._tree[1].glo)
+        return self._tree[1], self._tree_texture
 
     def _mesh_trees(self) -> MeshTrees:
         posing = self._posing
@@ -354,6 +357,7 @@ class GpuScene(Struct, eq=False, dict=True):
             self._data.release()
         if self._tree is not None:
             self._tree[1].release()
+            self.device.raw.delete("glDeleteTextures", self._tree_texture)
         if self._posing is not None:
             self._posing.release()
         if self._before is not None:

@@ -94,9 +94,10 @@ def _copy_with_border(device: Device, image: GpuTexture, array: GpuTexture, laye
             device.raw.glCopyImageSubData(*source, *target, width, height, 1)
 
 
-def check_size(device: Device, name: str, size: int) -> None:
-    """Refuse a buffer of the scene's that is larger than a storage block may be: shaders would see a part of it."""
-    most = device.limits["storage_block"]
+def check_size(device: Device, name: str, size: int, *, texel: int = 0) -> None:
+    """Refuse a buffer of the scene's that is larger than shaders can see; `texel`: bytes that they fetch at once."""
+    most = texel * device.limits["texture_buffer"] if texel else device.limits["storage_block"]
     if size > most:
-        text = f"the scene's '{name}' takes {size} bytes, a storage block of this device holds {most}"
+        kind = "texture buffer" if texel else "storage block"
+        text = f"the scene's '{name}' takes {size} bytes, a {kind} of this device holds {most}"
         raise RenderError(Problem("RG435", text))

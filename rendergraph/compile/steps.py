@@ -400,7 +400,7 @@ class _Compiler(Struct, eq=False, dict=True):
         if "scene_tree" in program.uniforms:
             check_scene_includes(step, texts(), self.types)
             sampled.add("scene_tree")
-            uniforms["scene_tree"] = self.units.unit((self.scene.tree(),), 0, binds)
+            uniforms["scene_tree"] = self.units.unit((self.scene.tree()[1],), 0, binds)
         cls, resources, sampled = self.types[step.node].cls, self.plan.resources, {*sampled, *materials}
         check_kept_text(step, texts, cls, resources)
         check_program(step, program, texts, resources, uniforms, blocks, sampled, cls)

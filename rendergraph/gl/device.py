@@ -256,6 +256,7 @@ def _wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
         "images": raw.integer(0x8F38),
         "storage_bindings": raw.integer(0x90DD),
         "storage_block": raw.integer(0x90DE),
+        "texture_buffer": raw.integer(0x8C2B),  # texels
         "vertex_storage": raw.integer(0x90D6),  # blocks
         "geometry_storage": raw.integer(0x90D7),
         "fragment_storage": raw.integer(0x90DA),

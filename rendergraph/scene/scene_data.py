@@ -135,7 +135,7 @@ def scene_data_facts(scene: Scene, rays: bool = False) -> SceneDataFacts:
     width = 6 + sum(size for name, size in _OPTIONAL.items() if any(getattr(m, name) is not None for m in scene.meshes))
     emitters = sum(len(scene.meshes[scene.objects[number].mesh].indices) for number in emitting_objects(scene))
     textures = expected_arrays(scene)
-    trees = most_bytes(len(scene.objects), sum(len(mesh.indices) for mesh in scene.meshes)) if rays else 0
+    trees = most_bytes(scene) if rays else 0
     return SceneDataFacts(
         bytes=4 * width * vertices
         + INSTANCE_DATA.itemsize * len(scene.objects)

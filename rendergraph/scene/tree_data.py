@@ -22,6 +22,7 @@ Corners of two boxes share words; the left one has the lower 16 bits. A referenc
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -73,20 +74,27 @@ def first_rows(objects: int) -> int:
     return _HEADER + _OBJECT * (objects + 1) + _NODE * objects
 
 
-def most_bytes(objects: int, triangles: int) -> int:
-    """Return a limit of the buffer's bytes, known before any tree is built; `triangles` of all meshes."""
-    return 16 * (first_rows(objects) + (_NODE + _TRIANGLE) * (triangles + _MOST_COPIES * (objects > 1)))
+def _copies(scene: Scene) -> int:
+    """The most triangles that the shared tree has several times."""
+    uses = Counter(placed.mesh for placed in scene.objects)
+    return min(sum(len(scene.meshes[mesh].indices) * count for mesh, count in uses.items() if count > 1), _MOST_COPIES)
+
+
+def most_bytes(scene: Scene) -> int:
+    """Return a limit of the buffer's bytes, known before any tree is built."""
+    triangles = sum(len(mesh.indices) for mesh in scene.meshes) + _copies(scene)
+    return 16 * (first_rows(len(scene.objects)) + (_NODE + _TRIANGLE) * triangles)
 
 
 def stack_size(scene: Scene) -> int:
     """Return how many entries a traversal needs at most, known before any tree is built."""
-    triangles = sum(len(mesh.indices) for mesh in scene.meshes) + _MOST_COPIES
-    return depth_limit(len(scene.objects)) + depth_limit(triangles) + 3  # the end, the way back to the objects, one more
+    triangles = sum(len(mesh.indices) for mesh in scene.meshes) + _copies(scene)
+    return depth_limit(len(scene.objects)) + depth_limit(triangles) + 3  # the end, a way back to the objects, one more
 
 
 def _moving(scene: Scene) -> set[int]:
     """The objects that are elsewhere or have another shape at another time."""
-    names = {rest.rpartition(".")[0] for kind, _, rest in (p.partition(".") for p in scene.keyframes) if kind == "objects"}
+    names = {path.partition(".")[2].rpartition(".")[0] for path in scene.keyframes if path.startswith("objects.")}
     for name in list(names):
         if (copies := scene.copies.get(("objects", name))) is not None:
             names.update(f"{name}.{number}" for number in range(len(copies.offsets)))

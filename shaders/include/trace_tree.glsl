@@ -3,8 +3,8 @@
 #include <scene.glsl>
 
 uniform isamplerBuffer scene_tree;
+#define SCENE_TREE(row) texelFetch(scene_tree, row)
 
-#define SCENE_TREE(i) texelFetch(scene_tree, i)
 struct Hit {
     float distance;     // along the direction, in its lengths
     int instance;
@@ -31,9 +31,9 @@ vec3 trace_permuted(vec3 v, int last) {
 // those the nearest is the hit. The triangle test is that of S. Woop, C. Benthin and I. Wald ("Watertight Ray/Triangle
 // Intersection", 2013): no ray passes between two triangles that share an edge.
 //
-// Each turn of the inner loop visits a node and tests a triangle, and invocations leave it only when nothing is left of
-// the tree. Those that a processor runs in lockstep then do the same work most of the time, and the set of those that
-// are active seldom changes. The stack cannot overflow: depths of trees are limited when they are built, and
+// Each turn of the inner loop visits two nodes and tests a triangle, and invocations leave it only when nothing is left
+// of the tree. Those that a processor runs in lockstep then do the same work most of the time, and the set of those
+// that are active seldom changes, which llvmpipe's branches can predict. The stack cannot overflow: depths of trees are limited when they are built, and
 // TRACE_STACK follows from the limits.
 bool trace(
     vec3 origin, vec3 direction, float nearest, float farthest, int wanted, int rejected, bool any, int passing,
@@ -88,29 +88,30 @@ bool trace(
             node = is_wanted ? low.w : next;
         }
         do {
-            int next; vec3 a,b,c,d;
+            vec3 a, b, c, d;
+            int next;
             for (int k = 0; k < 2; ++k) {
-            bool is_inner = uint(node) < uint(TRACE_UP);
-            int row = is_inner ? node : 0;
-            ivec4 low = SCENE_TREE(row), high = SCENE_TREE(row + 1);
-            a = (vec3(low.xyz & 0xFFFF) - grid_origin) * inverse;
-            b = (vec3(high.xyz & 0xFFFF) - grid_origin) * inverse;
-            c = (vec3((low.xyz >> 16) & 0xFFFF) - grid_origin) * inverse;
-            d = (vec3((high.xyz >> 16) & 0xFFFF) - grid_origin) * inverse;
-            vec3 enter = min(a, b), leave = max(a, b);
-            float left_enter = max(max(enter.x, enter.y), max(enter.z, nearest));
-            float left_leave = min(min(leave.x, leave.y), min(leave.z, reach));
-            enter = min(c, d);
-            leave = max(c, d);
-            float right_enter = max(max(enter.x, enter.y), max(enter.z, nearest));
-            float right_leave = min(min(leave.x, leave.y), min(leave.z, reach));
-            bool left = left_enter <= left_leave * 1.000001, right = right_enter <= right_leave * 1.000001;
-            bool right_first = right && (!left || right_enter < left_enter);
-            stack[top] = right_first ? low.w : high.w;
-            next = stack[top - 1];
-            next = left || right ? (right_first ? high.w : low.w) : next;
-            top += !is_inner ? 0 : left && right ? 1 : left || right ? 0 : -1;
-            node = is_inner ? next : node;
+                bool is_inner = uint(node) < uint(TRACE_UP);
+                int row = is_inner ? node : 0;
+                ivec4 low = SCENE_TREE(row), high = SCENE_TREE(row + 1);
+                a = (vec3(low.xyz & 0xFFFF) - grid_origin) * inverse;
+                b = (vec3(high.xyz & 0xFFFF) - grid_origin) * inverse;
+                c = (vec3((low.xyz >> 16) & 0xFFFF) - grid_origin) * inverse;
+                d = (vec3((high.xyz >> 16) & 0xFFFF) - grid_origin) * inverse;
+                vec3 enter = min(a, b), leave = max(a, b);
+                float left_enter = max(max(enter.x, enter.y), max(enter.z, nearest));
+                float left_leave = min(min(leave.x, leave.y), min(leave.z, reach));
+                enter = min(c, d);
+                leave = max(c, d);
+                float right_enter = max(max(enter.x, enter.y), max(enter.z, nearest));
+                float right_leave = min(min(leave.x, leave.y), min(leave.z, reach));
+                bool left = left_enter <= left_leave * 1.000001, right = right_enter <= right_leave * 1.000001;
+                bool right_first = right && (!left || right_enter < left_enter);
+                stack[top] = right_first ? low.w : high.w;
+                next = stack[top - 1];
+                next = left || right ? (right_first ? high.w : low.w) : next;
+                top += !is_inner ? 0 : left && right ? 1 : left || right ? 0 : -1;
+                node = is_inner ? next : node;
             }
 
             bool is_leaf = node < 0 && in_mesh;

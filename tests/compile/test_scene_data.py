@@ -588,7 +588,7 @@ def test_tracing_needs_rays_and_only_the_scene_has_them(bench: Any) -> None:
     facts = traced_too.link().graph.scene_data
     assert "of trees for rays; it is" in traced_too.plan().reasons["the scene's data"]
     with bench.session.current():
-        assert bench.session.compile(traced_too).scene.tree().size <= facts.trees < facts.bytes
+        assert bench.session.compile(traced_too).scene.tree()[0].size <= facts.trees < facts.bytes
 
 
 def test_images_that_only_arrays_were_made_of_are_freed(bench: Any, shared: Path) -> None:
