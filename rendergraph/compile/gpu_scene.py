@@ -213,7 +213,7 @@ class GpuScene(Struct, eq=False, dict=True):
         return self._data
 
     def tree(self) -> tuple[moderngl.Buffer, int]:
-        """The trees for `trace.glsl` and the GL texture that fetches from them, built when a program first looks at them.
+        """The trees for `trace.glsl` and the GL texture that fetches from them, built when a program first looks.
 
         Software rasterisers fetch texels in a third of the time that elements of a storage block take them.
         """

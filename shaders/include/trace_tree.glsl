@@ -76,7 +76,7 @@ bool trace(
             shear = vec3(permuted.xy, 1.0) / permuted.z;
             flags = scale.w;  // below 0 for the shared tree, whose triangles have them
             bool is_wanted = flags < 0 || ((flags & wanted) == wanted && (flags & rejected) == 0);
-            int next = stack[top - 1];
+            int next = stack[max(top - 1, 0)];
             bool is_last = next == TRACE_END;  // so there is no way back
             if (is_wanted) {
                 grid_origin = (object_origin - intBitsToFloat(low.xyz)) * intBitsToFloat(scale.xyz);
@@ -108,7 +108,7 @@ bool trace(
                 bool left = left_enter <= left_leave * 1.000001, right = right_enter <= right_leave * 1.000001;
                 bool right_first = right && (!left || right_enter < left_enter);
                 stack[top] = right_first ? low.w : high.w;
-                next = stack[top - 1];
+                next = stack[max(top - 1, 0)];
                 next = left || right ? (right_first ? high.w : low.w) : next;
                 top += !is_inner ? 0 : left && right ? 1 : left || right ? 0 : -1;
                 node = is_inner ? next : node;
@@ -131,7 +131,7 @@ bool trace(
             int own = third.w < 0 ? flags : third.w;
             bool is_hit = is_leaf && inside && sum != 0.0 && distance > nearest && distance < hit.distance
                 && (own & wanted) == wanted && (own & rejected) == 0;
-            next = stack[top - 1];
+            next = stack[max(top - 1, 0)];
             bool is_last = (leaf & 3) == 0;
             top -= is_leaf && is_last ? 1 : 0;
             node = !is_leaf ? node : is_last ? next : node - 3;  // a leaf of the others
