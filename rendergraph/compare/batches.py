@@ -162,10 +162,8 @@ def merge(graphs: Sequence[Graph]) -> tuple[Graph, tuple[dict[str, str], ...]]:
             textures.setdefault(_renamed(end, own), replace(info, view=_renamed_view(info.view, own)))
         outputs |= {f"{number}/{name}": _renamed(end, own) for name, end in graph.outputs.items()}
     first = graphs[0]
-    merged = Graph(first.name, nodes, outputs, first.size, first.lights, textures)
-    scene_data = next((graph.scene_data for graph in graphs if graph.scene_data is not None), None)
-    of_scene = {"objects": first.objects, "environment": first.environment, "scene_data": scene_data}
-    return replace(merged, **of_scene), names
+    reads = next((graph for graph in graphs if graph.facts.scene_data is not None), first)
+    return Graph(first.name, nodes, outputs, reads.facts, textures, knows_objects=first.knows_objects), names
 
 
 def _renamed(end: Endpoint, names: Mapping[str, str]) -> Endpoint:

@@ -91,8 +91,8 @@ class Recording:
     def add(self, request: StepRequest) -> None:
         """Keep a request, unless it would draw nothing onto existing contents."""
         objects = request.options.get("objects")
-        if isinstance(objects, tuple) and self.graph.objects is not None:
-            names = [one.name for one in self.graph.objects]
+        if isinstance(objects, tuple) and self.graph.knows_objects:
+            names = [one.name for one in self.graph.facts.objects]
             for name in objects:
                 if name not in names:
                     text = f"it draws object '{name}', which the scene does not have{suggestion(name, names)}"
@@ -266,7 +266,7 @@ def _why_empty(graph: Graph, node: GraphNode, name: str) -> str:
     tables = [ports[source] for source in named if isinstance(source, str) and isinstance(ports.get(source), Views)]
     if all(getattr(port, "lights", None) is None for port in (ports[name], *tables)):
         return "there is nothing to draw"
-    kinds = Counter(light.type for light in graph.lights)
+    kinds = Counter(light.type for light in graph.facts.lights)
     listed = " and ".join(f"{count} {kind}" for kind, count in kinds.items())
     return f"it uses none of the scene's lights ({listed})" if listed else "the scene has no light"
 

@@ -52,8 +52,9 @@ class _VersionAssignment:
         self.written: dict[str, set[tuple[int, int | None]]] = {}
         self.resources: dict[str, Resource] = {}
         for semantic, end in OF_SCENE.items():
+            data = graph.facts.scene_data
             for info in graph.facts.of_scene(semantic):
-                note = graph.scene_data.note if end == SCENE_DATA and graph.scene_data is not None else ""
+                note = data.note if end == SCENE_DATA and data is not None else ""
                 self.resources[end.port] = Resource(end.port, info.storage, "scene", note=note)
                 self.final[end] = end.port, 0
         self.views: dict[str, ViewTable] = {CAMERA: ViewTable()}

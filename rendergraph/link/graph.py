@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from msgspec import Struct, field
 
 from rendergraph.catalog import NodeType
-from rendergraph.declare import CameraFacts, Facts, LightFacts, MaterialFacts, Node, Texel, TextureInfo
+from rendergraph.declare import Facts, Node, Texel, TextureInfo
 from rendergraph.document import Value
 from rendergraph.errors import Place, Problem
-from rendergraph.facts import SELECTIONS, ObjectFacts, SceneDataFacts
-from rendergraph.textures import Sampler, TextureDesc
+from rendergraph.facts import SELECTIONS
+from rendergraph.textures import Sampler
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -62,11 +62,11 @@ class Graph(Struct, frozen=True, dict=True):
     """A checked pipeline.
 
     Attributes:
+        facts: what all nodes know of the scene.
         textures: the properties of every port, internals and functions included; an `InOut` shares its source's.
         aliases: outputs of sub-pipelines and of disabled nodes, `glow.radiance`, and the ports they stand for.
         disabled: nodes that `enabled: false` removes; they are not members.
-        environment: read by inputs of an environment that have no link.
-        scene_data: likewise, of the scene's data; None if no node has such an input.
+        knows_objects: False without a scene, where any may exist.
         unlit: nodes that need an environment where the scene has none; they are not members either.
         overwritten: what is wrong if a reader, the first of two nodes, cannot run between the steps of the second.
         cyclic: where nodes form a cycle, though their steps need not: each link by its reader, input and source.
@@ -75,17 +75,12 @@ class Graph(Struct, frozen=True, dict=True):
     name: str
     members: Mapping[str, GraphNode]
     outputs: Mapping[str, Endpoint]
-    size: tuple[int, int]
-    lights: tuple[LightFacts, ...] = ()
+    facts: Facts
     textures: Mapping[Endpoint, TextureInfo] = field(default_factory=dict)
     warnings: tuple[Problem, ...] = ()
     aliases: Mapping[str, Endpoint] = field(default_factory=dict)
     disabled: tuple[str, ...] = ()
-    objects: tuple[ObjectFacts, ...] | None = None
-    environment: TextureDesc | None = None
-    scene_data: SceneDataFacts | None = None
-    materials: tuple[MaterialFacts, ...] = ()
-    camera: CameraFacts = CameraFacts()
+    knows_objects: bool = True
     unlit: tuple[str, ...] = ()
     overwritten: Mapping[tuple[str, str], Problem] = field(default_factory=dict)
     cyclic: Mapping[tuple[str, str, Endpoint], Value] = field(default_factory=dict)
@@ -109,25 +104,16 @@ class Graph(Struct, frozen=True, dict=True):
     def __contains__(self, node: object) -> bool:
         return node in self.members
 
-    @cached_property
-    def facts(self) -> Facts:
-        """What all nodes know of the scene."""
-        return Facts(
-            self.size,
-            self.lights,
-            objects=self.objects or (),
-            environment=self.environment,
-            scene_data=self.scene_data,
-            materials=self.materials,
-            camera=self.camera,
-        )
+    @property
+    def size(self) -> tuple[int, int]:
+        return self.facts.viewport
 
     @cached_property
     def unfilled(self) -> frozenset[str]:
         """Selections of objects (`transparent`, `casters`, …) that are empty in this scene."""
-        if self.objects is None:
+        if not self.knows_objects:
             return frozenset()
-        kinds = {(one.casts_shadow, one.blended) for one in self.objects if not one.hidden}
+        kinds = {(one.casts_shadow, one.blended) for one in self.facts.objects if not one.hidden}
         return frozenset(name for name, takes in SELECTIONS.items() if not any(takes(*kind) for kind in kinds))
 
     @cached_property

@@ -54,7 +54,6 @@ if TYPE_CHECKING:
 
 _DEFAULT = Material("default", base_color=(0.8, 0.8, 0.8, 1.0))
 SECTION_NAMES = ("objects", "materials", "lights", "cameras")
-SECTION_NAMES = ("objects", "materials", "lights", "cameras")
 _GENERATED = ("base_color", "normal", "metallic_roughness", "occlusion")
 _SRGB = ("base_color", "emissive", "specular_color", "sheen_color")
 

@@ -194,7 +194,7 @@ class Drawing(Struct, eq=False, dict=True):
         if node is not None and options.frames == range(1, 2):
             text = f"'{node}' accumulates over frames, but only frame 1 was rendered; --frames 16-16 shows more"
             yield Problem("RG620", text, Place(graph.name), severity="warning")
-        elif graph.camera.shutter and self.executable.uses_previous and options.frames == range(1, 2):
+        elif graph.facts.camera.shutter and self.executable.uses_previous and options.frames == range(1, 2):
             text = "motion is measured from frame to frame, but only frame 1 was rendered; --frames 2-2 shows it"
             yield Problem("RG627", text, Place(graph.name), severity="warning")
         if options.subframes > 1 and not (self.camera is None or self.camera.shutter):

@@ -169,8 +169,9 @@ def fitting_links(resolved: Resolved) -> dict[str, dict[str, list[str]]]:
 def expand(linked: Linked, options: RenderOptions = RenderOptions()) -> Expanded:
     """Record the steps of all requested outputs."""
     if options.subframes > 1:  # they blur; nodes that imitate the shutter have nothing to do
-        graph = linked.graph
-        linked = replace(linked, graph=replace(graph, camera=replace(graph.camera, shutter=0.0)))
+        facts = linked.graph.facts
+        facts = replace(facts, camera=replace(facts.camera, shutter=0.0))
+        linked = replace(linked, graph=replace(linked.graph, facts=facts))
     if options.turntable:
         linked = replace(linked, scene=on_turntable(linked.scene, options.fps, options.turntable))
     requests = requested_outputs(linked.graph, options)

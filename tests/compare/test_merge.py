@@ -155,6 +155,15 @@ def test_little_memory_means_several_batches(make: Any, gl: rg.Session) -> None:
 
 
 @pytest.mark.slow
+def test_the_shutter_of_the_camera_is_open_together_as_alone(gl: rg.Session) -> None:
+    base = rg.load("motion-blur", size=(48, 27)).select(shutter=1.0).set("light.shading", "unlit")
+    variants = [base.set("blur.radius", radius) for radius in (0.005, 0.1)]
+    together, own = pictures(gl, variants, 6), alone(gl, variants, 6)
+    np.testing.assert_array_equal(together, own)
+    assert not np.array_equal(*own)
+
+
+@pytest.mark.slow
 def test_functions_and_views_are_renamed_with_their_nodes(gl: rg.Session) -> None:
     base = rg.load("forward-prepass", scene="cornell_box", size=(48, 27))
     variants = [base.set("sun.resolution", size).set("shadows.taps", taps) for size in (64, 256) for taps in (1, 3)]

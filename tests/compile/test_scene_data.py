@@ -413,7 +413,7 @@ def test_facts_know_the_bytes_and_only_readers_pay(bench: Any) -> None:
 
     pipeline = bench.pipeline(ONE.replace("of}", "asks}"), Asks, shaders={"of.frag": PLACE}, scene=BOXES)
     plain = rg.load("deferred", scene=bench.folder / "scene.yaml")
-    assert plain.link().graph.scene_data is None
+    assert plain.link().graph.facts.scene_data is None
     with bench.session.current():
         assert bench.session.compile(plain).scene._data is None
     with bench.session.current():
@@ -585,7 +585,7 @@ def test_tracing_needs_rays_and_only_the_scene_has_them(bench: Any) -> None:
         scene = Input(SceneData, rays=True, doc="Scene.")
 
     traced_too = bench.pipeline(ONE.replace("of}", "traced}"), Traced, shaders={"of.frag": traced}, scene=BOXES)
-    facts = traced_too.link().graph.scene_data
+    facts = traced_too.link().graph.facts.scene_data
     assert "of trees for rays; it is" in traced_too.plan().reasons["the scene's data"]
     with bench.session.current():
         assert bench.session.compile(traced_too).scene.tree()[0].size <= facts.trees < facts.bytes

@@ -11,7 +11,7 @@ import pytest
 
 from rendergraph.allocate import ResourcePlan, allocate
 from rendergraph.catalog import NodeType
-from rendergraph.declare import Function, InOut, Input, LightFacts, Node, Output, TextureInfo, param
+from rendergraph.declare import Facts, Function, InOut, Input, LightFacts, Node, Output, TextureInfo, param
 from rendergraph.diagrams import dot, graph_json, lifetimes_svg, mermaid, plan_json, plan_text, svg, text
 from rendergraph.expand import Expansion
 from rendergraph.link import Endpoint, Graph, GraphNode
@@ -86,7 +86,7 @@ def graph(sky: str = "sky") -> Graph:
         Endpoint("display", "color"): TextureInfo(TextureDesc("texture2d", "rgba8", *FULL), DisplayColor),
     }
     lights = (LightFacts("sun", "directional"),)
-    return Graph("demo", members, {"image": Endpoint("display", "color")}, FULL, lights, textures)
+    return Graph("demo", members, {"image": Endpoint("display", "color")}, Facts(FULL, lights), textures)
 
 
 def plan() -> ResourcePlan:
@@ -278,7 +278,7 @@ def test_an_empty_plan_has_views(view: object) -> None:
 
 
 def test_an_empty_graph_has_views() -> None:
-    empty = Graph("empty", {}, {}, FULL)
+    empty = Graph("empty", {}, {}, Facts(FULL))
     assert text(empty) == "empty  320×180\n"
     ET.fromstring(svg(empty))
     assert mermaid(empty) == "flowchart LR\n"

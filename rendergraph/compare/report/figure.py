@@ -50,7 +50,7 @@ def figure(
     """
     require("a figure", "figures", "matplotlib")
     from matplotlib.figure import Figure  # slow to import, and an extra
-    from matplotlib.patches import Rectangle
+    from matplotlib.patches import Rectangle  # likewise
 
     named = list(crops.items()) if isinstance(crops, Mapping) else [("", each) for each in crops]
     across, down = comparison.size

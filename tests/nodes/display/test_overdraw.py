@@ -55,7 +55,7 @@ def test_lights_count_where_they_reach(session: rg.Session) -> None:
     sets = ["overdraw.depth=prepass.depth", "overdraw.counted=lights"]
     pipeline = rg.load("overdraw", scene="many_lights", size=(48, 27), sets=sets)
     frame = session.render(pipeline, taps=["overdraw.count"])
-    lights = len(pipeline.link().graph.lights)
+    lights = len(pipeline.link().graph.facts.lights)
     count = frame["overdraw.count"]
     assert 2 < count.max() <= lights
     assert len(np.unique(count)) > 3
