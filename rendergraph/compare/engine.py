@@ -111,8 +111,9 @@ def compare(
 
     Args:
         pipelines: the pipelines, also by their names or files; all use the scene and size of the first one.
-        reference: a picture file or another pipeline, also by its name; the first of `pipelines` by default. One with
-            the outputs `radiance` and `variance` is a truth: it is drawn until its noise is small.
+        reference: a picture file or another pipeline, also by its name, as `path-traced:light.seed=1`; the first of
+            `pipelines` by default. One with the outputs `radiance` and `variance` is a truth: it is drawn until its
+            noise is small.
         options: how to render and measure; in this process, the default, the pipelines take turns.
         names: of the pipelines; those of their files by default.
         size: width and height of the pictures; those of the first pipeline by default.

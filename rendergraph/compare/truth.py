@@ -174,15 +174,14 @@ def draw_truth(
     with gpu.current():
         drawing = stages.compile(stages.expand(planned.linked, options), gpu)
         drawing.begin(lead=0)
-    due, share, excess, samples = 1, 0.0, None, 0
-    yield TruthProgress(0.0, 0)
+    due, share, excess, samples, seconds = 1, 0.0, None, 0, 0.0
     for drawn in itertools.count(1):
+        part = max(share * (drawn - 1) / due, seconds / limits.seconds)
+        yield TruthProgress(min(1.0, part), samples * (drawn - 1), excess)
         with gpu.current():
             drawing.draw(frame + drawn - 1)
         seconds = time.monotonic() - begun
         if drawn < due and seconds < limits.seconds:
-            part = max(share * drawn / due, seconds / limits.seconds)
-            yield TruthProgress(min(1.0, part), samples * drawn, excess)
             continue
         with gpu.current():
             truth = _truth(drawing.read().arrays, drawn, seconds)
@@ -196,9 +195,7 @@ def draw_truth(
         excess = left if math.isfinite(left) else None
         left = min(2.0, left, limits.most_samples / max(1, truth.samples))
         due = max(drawn + 1, math.ceil(drawn * left))
-        share = min(1.0, max(wanted / truth.noise if truth.noise > 0 else 0.0, truth.samples / limits.most_samples))
-        share = min(1.0, share * due / drawn)
-        yield TruthProgress(min(1.0, max(share * drawn / due, seconds / limits.seconds)), truth.samples, excess)
+        share = min(1.0, max(1 / excess if excess else 0.0, truth.samples / limits.most_samples)) * due / drawn
     yield truth
 
 

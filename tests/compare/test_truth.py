@@ -421,6 +421,10 @@ def test_a_sweep_s_file_has_the_limits_of_its_truth(tmp_path: Path) -> None:
     file = read_sweep(tmp_path / "study.yaml")
     assert {name: file.options[name] for name in limits} == limits
     assert SweepOptions(**file.options).limits.most_samples == 64
+    assert file.reference == str(tmp_path / "truth.yaml")
+    for given, read in {"path-traced:light.seed=1": "", "./truth.yaml:light.seed=1": f"{tmp_path}/"}.items():
+        (tmp_path / "study.yaml").write_text(yaml.safe_dump(text | {"reference": given}, sort_keys=False))
+        assert read_sweep(tmp_path / "study.yaml").reference == read + given.removeprefix("./")
 
 
 def test_the_report_shows_where_light_is_wrong_and_why(make: Maker, gl: rg.Session) -> None:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from rendergraph.pipelines.references import reference_selection
 from rendergraph.pipelines.references.mitsuba import installation
 
 from rendergraph.compare import compare
 from rendergraph.errors import UsageError
+from rendergraph.session.selection import Selection
 
 LISTED = """1000 libs found in cache `/etc/ld.so.cache'
 \tlibLLVM.so.19.1 (libc6,x86-64) => /lib/x86_64-linux-gnu/libLLVM.so.19.1
@@ -40,3 +43,10 @@ def test_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda _: object())
     with pytest.raises(UsageError, match="apt install libllvm19"):
         compare("forward", reference="mitsuba:max_bounces=2")
+
+
+def test_settings_of_its_node_need_no_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(installation, "require", lambda: None)
+    found = reference_selection(Selection("mitsuba:max_bounces=2,light.samples=8", sets=("ao.samples=4",)))
+    assert found.sets == ("light.max_bounces=2", "light.samples=8")
+    assert Path(str(found.source)).name == "mitsuba.yaml"
