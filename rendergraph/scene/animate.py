@@ -16,7 +16,7 @@ from rendergraph.facts import NO_EXTRA, Extra
 from rendergraph.scene import scene_values
 from rendergraph.scene.cameras import WIDE, bounding_sphere, framing_camera
 from rendergraph.scene.geometry import rigid, translation, vec3
-from rendergraph.scene.model import Matrix, Placement, Scene, Vec3
+from rendergraph.scene.model import Matrix, Orbit, Placement, Scene, Vec3
 from rendergraph.scene.surroundings import grounded, lit
 
 if TYPE_CHECKING:
@@ -74,6 +74,18 @@ def length(scene: Scene) -> float:
     ends += [float(curve.times[-1]) for curve in scene.keyframes.values()]
     orbit = abs(scene.orbit.degrees_per_second) if scene.orbit is not None else 0.0
     return max(ends, default=0.0) or (360.0 / orbit if orbit else 0.0)
+
+
+def on_turntable(scene: Scene, fps: float, frames: range, aspect: float) -> Scene:
+    """Return the scene with its camera on one closed circle, in place of the scene's own orbit.
+
+    It goes around its target. A camera that `complete` has added stands where everything is in the picture all around.
+    """
+    camera = scene.camera
+    if camera is not None and camera.name == "default" and ("cameras", "default") not in scene.recipe:
+        camera = replace(framing_camera(_over_clips(scene), aspect, around=True), shutter=camera.shutter)
+        scene = replace(scene, cameras={**scene.cameras, "default": camera})
+    return replace(scene, orbit=Orbit("", 360.0 * fps / len(frames), begin=(frames[0] - 1) / fps))
 
 
 def play(scene: Scene, clip: str | None = None, speed: float = 1.0, start: float = 0.0) -> Scene:

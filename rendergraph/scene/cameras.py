@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rendergraph import projection
-from rendergraph.scene.geometry import vec3
+from rendergraph.scene.geometry import euler_matrix, vec3
 from rendergraph.scene.model import Camera, Matrix, Scene, Vec3
 from rendergraph.steps import ViewMatrices
 
@@ -50,7 +50,9 @@ def bounding_sphere(scene: Scene) -> tuple[Vec3, float]:
     return vec3((low + high) / 2), max(float(np.linalg.norm(high - low)) / 2, 1e-6)
 
 
-def framing_camera(scene: Scene, aspect: float = WIDE, most_points: int = MOST_POINTS) -> Camera:
+def framing_camera(
+    scene: Scene, aspect: float = WIDE, most_points: int = MOST_POINTS, *, around: bool = False
+) -> Camera:
     """Frame everything drawn from (1, 0.6, 1.5), 45° high, from as near as its own points allow.
 
     The camera looks along that direction, off-centre if that brings it nearer. Each side of the view is determined by
@@ -59,6 +61,7 @@ def framing_camera(scene: Scene, aspect: float = WIDE, most_points: int = MOST_P
     Args:
         aspect: width over height of the picture.
         most_points: number of placed vertices above which the boxes of their meshes are framed.
+        around: look at the middle, from as far as to have everything in the picture from all directions around.
     """
     center, radius = bounding_sphere(scene)
     axes = _axes()
@@ -66,7 +69,13 @@ def framing_camera(scene: Scene, aspect: float = WIDE, most_points: int = MOST_P
     wide = tall * aspect
     # Outward normals of the view's four sides, then the way to the viewer: in the camera's axes, then the world's.
     sides = np.array([[1, 0, wide], [-1, 0, wide], [0, 1, tall], [0, -1, tall], [0, 0, 1]]) @ axes
-    right, left, top, bottom, front = _reaches(scene, sides, np.array(center), most_points).tolist()
+    turns = np.eye(3)[None]
+    if around:
+        turns = np.array([euler_matrix((0, degrees, 0)) for degrees in range(0, 360, 15)])
+    reaches = _reaches(scene, (sides @ turns).reshape(-1, 3), np.array(center), most_points).reshape(-1, 5)
+    right, left, top, bottom, front = reaches.max(axis=0).tolist()
+    if around:
+        right, top = left, bottom = max(right, left), max(top, bottom)
     away = max((right + left) / (2 * wide), (top + bottom) / (2 * tall))
     nearest = max(away - front, 1e-3 * radius)  # depth of the foremost point
     away = front + nearest

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-from msgspec.structs import replace
-
 from rendergraph.errors import Place, Problem, UsageError
 from rendergraph.scene import animate
-from rendergraph.scene.model import Orbit, Scene
+from rendergraph.scene.model import Scene
 from rendergraph.session.values import Expanded
 
 CIRCLE_SECONDS = 4.0
@@ -37,11 +35,6 @@ def film_frames(
         raise UsageError(Problem("RG500", "frames: the scene has no clip, keyframes or orbit to be as long as"))
     seconds = seconds or (CIRCLE_SECONDS if turntable and frames is None else length)
     return range(1, max(1, round(seconds * fps)) + 1)
-
-
-def on_turntable(scene: Scene, fps: float, frames: range) -> Scene:
-    """Return the scene with the camera on one closed circle around its target, in place of the scene's own orbit."""
-    return replace(scene, orbit=Orbit("", 360.0 * fps / len(frames), begin=(frames[0] - 1) / fps))
 
 
 def standstill_warning(expanded: Expanded) -> list[Problem]:

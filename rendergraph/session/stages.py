@@ -27,12 +27,11 @@ from rendergraph.catalog import Catalog
 from rendergraph.document import Document, YamlLimits
 from rendergraph.errors import InputError, Option, Place, Problem, RendergraphError, UsageError
 from rendergraph.resolve import PipelineSpec
-from rendergraph.scene.animate import complete
+from rendergraph.scene.animate import complete, on_turntable
 from rendergraph.scene.facts import camera_facts, environment_facts, light_facts, material_facts, object_facts
 from rendergraph.scene.model import Scene
 from rendergraph.scene.scene_data import scene_data_facts
 from rendergraph.session import driven
-from rendergraph.session.films import on_turntable
 from rendergraph.session.outputs import every_port, requested_outputs
 from rendergraph.session.picture_metadata import PictureMetadata, is_picture, read_picture_metadata
 from rendergraph.session.scenes import scene_of
@@ -173,7 +172,9 @@ def expand(linked: Linked, options: RenderOptions = RenderOptions()) -> Expanded
         facts = replace(facts, camera=replace(facts.camera, shutter=0.0))
         linked = replace(linked, graph=replace(linked.graph, facts=facts))
     if options.turntable:
-        linked = replace(linked, scene=on_turntable(linked.scene, options.fps, options.turntable))
+        width, height = linked.graph.size
+        turned = on_turntable(linked.scene, options.fps, options.turntable, width / height)
+        linked = replace(linked, scene=turned)
     requests = requested_outputs(linked.graph, options)
     ends = {name: port.end for name, port in requests.items()}
     return Expanded(linked, options, requests, rendergraph.expand.expand(linked.graph, ends))

@@ -14,6 +14,7 @@ from rendergraph.cli import main
 from rendergraph.errors import InputError, UsageError
 from rendergraph.images import read
 from rendergraph.scene import animate
+from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.load import load
 from rendergraph.session.films import film_frames
 
@@ -136,3 +137,22 @@ def test_wrong_films(scene: Path) -> None:
         pipeline.film("a.avi")
     with pytest.raises(InputError, match="RG504"):
         pipeline.film("nowhere/a.gif")
+
+
+def test_an_added_camera_has_everything_in_its_circle(tmp_path: Path) -> None:
+    """From all around, and no farther away than that takes; it looks at the middle."""
+    (tmp_path / "long.yaml").write_text("scene: 1\nobjects: {box: {shape: box, size: [6, 1, 0.5], at: [2, 3, 1]}}\n")
+    pipeline = rg.load("forward", scene=tmp_path / "long.yaml", size=(160, 90))
+    frames = range(1, 25)
+    scene = pipeline.expand(frames=frames, turntable=frames).linked.scene
+    corners = np.array([(x, y, z, 1.0) for x in (-1, 5) for y in (2.5, 3.5) for z in (0.75, 1.25)])
+    extents = []
+    for number in frames:
+        camera = animate.at(scene, (number - 1) / 30).camera
+        assert camera is not None
+        assert camera.target is not None
+        np.testing.assert_allclose(camera.target, (2, 3, 1), atol=1e-12)
+        view = view_matrices(camera, (160, 90))
+        points = corners @ (view.projection @ view.view).T
+        extents.append(np.abs(points[:, :2] / points[:, 3:]).max())
+    assert 0.93 < max(extents) < 0.95
