@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from textwrap import dedent, indent
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
@@ -19,6 +19,9 @@ import rendergraph as rg
 from rendergraph.api import Node
 from rendergraph.catalog import Catalog
 from rendergraph.errors import RendergraphError
+from rendergraph.session import gpu
+from rendergraph.session.gpu import Gpu
+from rendergraph.session.gpu_cache import GpuCache
 
 HEAD = '''"""A node of a stranger's."""
 
@@ -120,6 +123,42 @@ def browser() -> Iterator[Any]:
         started = driver.chromium.launch(executable_path=found, args=["--no-sandbox", "--disable-gpu"])
         yield started
         started.close()
+
+
+class LentGpu(Gpu):
+    """What a command line opens in a test: caches of its own, on one context with the programs of earlier tests.
+
+    Compiling them again, though Mesa has them on its disk, takes ten times as long as drawing a small picture.
+    """
+
+    lender: ClassVar[Gpu | None] = None
+
+    def __init__(self, device: int | None = None, **options: Any) -> None:
+        self.is_lent = device is None and options == {}
+        if not self.is_lent:
+            super().__init__(device, **options)
+            return
+        if LentGpu.lender is None or not LentGpu.lender.is_usable:
+            LentGpu.lender = Gpu(cache=rg.CacheLimits(programs=192))
+        lender = LentGpu.lender
+        vars(self).update(vars(lender), cache=GpuCache(lender.device, rg.CacheLimits()))
+        for name in ("programs", "_pool", "_generator"):
+            setattr(self.cache, name, getattr(lender.cache, name))
+
+    def close(self) -> None:
+        if not self.is_lent:
+            super().close()
+        elif not self._closed:
+            self._closed = True
+            with self.device.current():
+                self.cache.clear_scene()
+                self.cache.kept.release()
+
+
+@pytest.fixture
+def lent_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let command lines that run in this process draw on one context."""
+    monkeypatch.setattr(gpu, "Gpu", LentGpu)
 
 
 class Bench:

@@ -29,7 +29,12 @@ from rendergraph.resources import shipped_pipelines
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(page for page in DOCS.rglob("*.md") if "generated" not in page.parts)]
-SMALL = ["--size", "48x27"]  # the last one counts
+SMALL = {  # added to what draws: of options given twice the last one counts
+    "run": ["--size", "48x27"],
+    "bench": ["--size", "48x27", "-n", "2"],
+    "compare": ["--size", "48x27", "-n", "1"],
+    "sweep": ["--size", "48x27", "-n", "1"],
+}
 NOT_RUN = ("apt-get ", "python3 -m venv ")
 
 
@@ -87,7 +92,7 @@ def test_a_command_in_the_text_is_one(page: Path, command: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_blocks_of_a_page(
-    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], lent_gpu: None
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("RENDERGRAPH_TRACEBACK", "1")
@@ -140,8 +145,8 @@ def _run_console(text: str, where: str, capsys: pytest.CaptureFixture[str]) -> N
         words = shlex.split(command)
         assert words[0] == "rendergraph", f"{where}: what is '{words[0]}'?"
         capsys.readouterr()
-        drawn = words[1] in ("run", "bench", "compare") and not words[2].endswith(".png")
-        code = main([*words[1:], *(SMALL if drawn else [])])
+        drawn = words[1] in SMALL and not words[2].endswith(".png") and "--list" not in words
+        code = main([*words[1:], *(SMALL[words[1]] if drawn else [])])
         out, err = capsys.readouterr()
         expected = shown.strip()
         fails = re.search(r"\bRG(?:\d|…)", expected) is not None

@@ -36,7 +36,7 @@ Cli = Callable[..., Result]
 
 
 @pytest.fixture
-def cli(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Cli:
+def cli(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], lent_gpu: None) -> Cli:
     """`cli("run", "forward")`, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("RENDERGRAPH_TRACEBACK", raising=False)
