@@ -24,7 +24,7 @@ def shown(name: str, catalog: Catalog) -> str:
 def example(name: str, folder: Path) -> rg.Pipeline:
     file = folder / "example.yaml"
     file.write_text(shown(name, Catalog.discover()), encoding="utf-8")
-    return rg.load(file, scene="glass", size=(48, 27))  # it has surfaces of every kind
+    return rg.load(file, scene="glass", size=(48, 27), shutter=0.5)  # it has surfaces of every kind
 
 
 @pytest.mark.parametrize("name", TYPES)
