@@ -111,7 +111,7 @@ def test_a_layout_magnifies_and_measures(tmp_path: Path) -> None:
 
     from rendergraph import images
 
-    layout: Any = sys.modules["layout"]
+    layout: Any = sys.modules["images.layout"]
     panels = [np.full((40, 60, 3), shade, np.uint8) for shade in (100, 151)]  # 0.2 of white apart
     details = [panel.repeat(2, 0).repeat(2, 1) for panel in panels]
     details[1][30, 40] = (255, 0, 0)

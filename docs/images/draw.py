@@ -33,10 +33,10 @@ from rendergraph.resolve import merge_patch
 from rendergraph.resources import folder
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE))
-from layout import Layout, laid_out, save  # noqa: E402  # beside this file
-
 DOCS = HERE.parent
+sys.path.insert(0, str(DOCS))
+from images.layout import Layout, laid_out, save  # noqa: E402  # beside this file
+
 SHARED = Path(os.environ.get("RENDERGRAPH_SHARED", DOCS.parents[1] / "shared"))
 SCENES = folder("rendergraph.pipelines") / "scenes"
 SAME = 0.1

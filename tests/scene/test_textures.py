@@ -175,6 +175,36 @@ def test_mistakes(tmp_path: Path, material: str, message: str) -> None:
         read(tmp_path, material)
 
 
+@pytest.mark.parametrize(
+    ("file", "old", "new", "message"),
+    [
+        (
+            "extension.py",
+            '"waves.glsl"',
+            '"wave.glsl"',
+            r"RG495 .*textures\['waves'\] has no file 'wave.glsl' beside it",
+        ),
+        ("extension.py", "Waves along u and v.", "", "RG495 .* has no documentation"),
+        (
+            "extension.py",
+            'float, "Amplitude.", 0.02',
+            'float, "Amplitude."',
+            "RG495 .* no number or tuple with a default",
+        ),
+        ("waves.glsl", "float height = high", "float height = hihg", r"waves.glsl:5:20: RG410 .* did you mean 'high'"),
+    ],
+)
+def test_mistakes_of_a_plugins_kind_have_their_places(
+    tmp_path: Path, plugin: Path, gl: rg.Session, file: str, old: str, new: str, message: str
+) -> None:
+    for name in ("extension.py", "waves.glsl", "groove.glsl"):
+        text = (plugin / name).read_text()
+        (tmp_path / name).write_text(text.replace(old, new) if name == file else text)
+    (tmp_path / "a.yaml").write_text(SCENE % "texture: {kind: waves, resolution: 16}")
+    with pytest.raises(InputError, match=message):
+        rg.load("forward", scene=tmp_path / "a.yaml", plugins=[tmp_path]).render(size=(16, 16), session=gl)
+
+
 def test_forward_and_deferred_draw_the_same(tmp_path: Path, gl: rg.Session) -> None:
     (tmp_path / "a.yaml").write_text(SCENE % "texture: {kind: bricks, resolution: 128}")
     one, other = (

@@ -111,6 +111,7 @@ def test_a_projective_view_of_a_directional_light(
     for name in ("shadow_map", "warped_map"):
         settings = (f"sun.type={name}", f"shadows.type={kind}", "sun.resolution=2048", *sets)
         loaded = rg.load("forward-prepass", scene="shadow_study", size=(240, 160), sets=settings, plugins=[tmp_path])
+        loaded = loaded.with_camera("eye=5,5,7.5 target=0,0.7,0 fov=40")
         frame = session.render(loaded, outputs=(), taps=("shadows.visibility",))
         pictures.append(frame["shadows.visibility"][0, ..., 0].astype(float))
     parallel, warped = pictures

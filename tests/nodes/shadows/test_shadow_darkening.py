@@ -6,7 +6,7 @@ import numpy as np
 
 import rendergraph as rg
 
-LIGHTS = "shadows.light=[inner_1, inner_4, outer_1, outer_2, outer_3]"
+LIGHTS = "shadows.light=[inner.0, inner.3, outer.0, outer.1, outer.2]"
 
 
 def test_what_lies_in_volumes_is_darker_by_the_factor_once_a_light(session: rg.Session) -> None:
