@@ -121,6 +121,7 @@ def line_schema() -> dict[str, Any]:
     references, components = msgspec.json.schema_components((_Line, _FailedLine), ref_template="#/definitions/{name}")
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
+        "$id": "urn:rendergraph:results:1",
         "title": "A line of results.jsonl",
         "oneOf": list(references),
         "definitions": components,

@@ -162,7 +162,10 @@ def schema(type: Type) -> Schema:
 
 
 def file_schema(table: Table) -> Schema:
-    return {"$schema": "http://json-schema.org/draft-07/schema#", **_table(table)}
+    """Return the schema of a kind of file; its `$id` ends in the version of the format."""
+    kind = table.what.split()[1]  # of "a pipeline", "a scene file"
+    head = {"$schema": "http://json-schema.org/draft-07/schema#", "$id": f"urn:rendergraph:{kind}:1"}
+    return {**head, **_table(table)}
 
 
 def as_markdown(value: Any) -> Any:
