@@ -31,20 +31,11 @@ _IMPORTS: FileCache[list[str]] = FileCache(4096)
 
 def run_key(planned: Planned, frame: int, reference: str) -> str:
     """Return the SHA-256 of everything that decides a run's picture and figures, `reference` being its reference's."""
-    linked, selection = planned.linked, planned.linked.selection
-    files = [str(linked.spec.scene), str(selection.environment), sources_digest(planned)]
+    linked = planned.linked
+    files = [str(linked.spec.scene), sources_digest(planned)]
     spec = linked.spec.to_yaml(origins=False)
-    parts = [
-        __version__,
-        spec,
-        files,
-        selection.camera,
-        selection.shutter,
-        linked.graph.size,
-        frame,
-        reference,
-        *_metrics(planned),
-    ]
+    size = linked.graph.size
+    parts = [__version__, spec, files, linked.selection.view, size, frame, reference, *_metrics(planned)]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 

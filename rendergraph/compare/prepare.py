@@ -479,13 +479,12 @@ def _study(base: Pipeline, frame: int, reference: str) -> dict[str, Any]:
 
     More values of an axis belong to the same study, and so do edited shaders: those runs are rendered again.
     """
-    selection, spec = base.selection, base.resolve().spec
+    view, spec = base.selection.view, base.resolve().spec
     width, height = spec.size
     return {
         "pipeline": spec.name,
         "scene": spec.scene_name or None,
-        "environment": str(selection.environment) if selection.environment else None,
-        "camera": selection.camera,
+        **{name: view.get(name) for name in ("environment", "camera", "variant", "ground", "shutter")},
         "size": f"{width}x{height}",
         "frame": frame,
         "reference": reference,

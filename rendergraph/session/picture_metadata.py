@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct
 
@@ -39,11 +39,10 @@ def pipeline_metadata(linked: Linked) -> dict[str, str]:
     fields = {
         "pipeline": linked.spec.to_yaml(origins=False),
         "folder": None if path is None or path in shipped_pipelines().values() else _inside(path.parent),
-        "camera": selection.camera,
-        "environment": None if selection.environment is None else shown_file(selection.environment.absolute()),
-        "variant": selection.variant,
-        "ground": "true" if selection.ground else None,
+        **selection.view,
     }
+    if selection.environment is not None:
+        fields["environment"] = shown_file(selection.environment.absolute())
     return {f"rendergraph:{name}": text for name, text in fields.items() if text is not None}
 
 
@@ -62,13 +61,10 @@ def _inside(folder: Path) -> str | None:
 
 
 class PictureMetadata(Struct, frozen=True):
-    """How a picture was made: its pipeline; what was chosen beside it; its frame."""
+    """How a picture was made: its pipeline; what was chosen beside it, by field of `Selection`; its frame."""
 
     document: Document
-    camera: str | None
-    environment: Path | None
-    variant: str | None
-    ground: bool
+    view: dict[str, Any]
     frame: int
     fps: float
 
@@ -105,10 +101,7 @@ def read_picture_metadata(path: Path, limits: YamlLimits) -> PictureMetadata:
     )
     return PictureMetadata(
         document,
-        fields.get("camera"),
-        Path(fields["environment"]) if "environment" in fields else None,
-        fields.get("variant"),
-        "ground" in fields,
+        {name: kind(fields[name]) for name, kind in _VIEW.items() if name in fields},
         _frame(fields),
         _fps(fields),
     )
@@ -126,3 +119,10 @@ def _fps(fields: Mapping[str, str]) -> float:
     except ValueError:
         return 30.0
     return number if math.isfinite(number) and number > 0 else 30.0
+
+
+def _share(text: str) -> float | None:
+    return float(text) if re.fullmatch(r"0(\.[0-9]{1,20})?|1(\.0)?", text) else None
+
+
+_VIEW: Mapping[str, Any] = {"camera": str, "environment": Path, "variant": str, "ground": bool, "shutter": _share}

@@ -83,6 +83,13 @@ class Selection(Struct, frozen=True):
                 raise UsageError(Problem("RG500", f"unknown limit '{name}'{suggestion(name, known)}"))
 
     @property
+    def view(self) -> dict[str, str]:
+        """What is chosen beside the pipeline's file and changes its pictures, as texts by field."""
+        names = ("camera", "environment", "variant", "ground", "shutter")
+        values = {name: getattr(self, name) for name in names}
+        return {name: str(value) for name, value in values.items() if value is not None and value is not False}
+
+    @property
     def label(self) -> str:
         """The source in one line."""
         is_name = isinstance(self.source, str) and "\n" not in self.source

@@ -33,7 +33,7 @@ from rendergraph.scene.model import Scene
 from rendergraph.scene.scene_data import scene_data_facts
 from rendergraph.session import driven
 from rendergraph.session.outputs import every_port, requested_outputs
-from rendergraph.session.picture_metadata import PictureMetadata, is_picture, read_picture_metadata
+from rendergraph.session.picture_metadata import is_picture, read_picture_metadata
 from rendergraph.session.scenes import scene_of
 from rendergraph.session.selection import RenderOptions, Selection
 from rendergraph.session.values import Expanded, Linked, Planned, Resolved
@@ -68,13 +68,10 @@ def resolve(selection: Selection, catalog: Catalog | None = None, document: Docu
     if is_picture(selection.source):
         picture = read_picture_metadata(Path(str(selection.source)), limits)
         source, frames, fps = picture.document, range(picture.frame, picture.frame + 1), picture.fps
-        selection = replace(
-            selection,
-            camera=selection.camera or picture.camera,
-            environment=selection.environment or _environment(selection, picture),
-            variant=selection.variant or picture.variant,
-            ground=selection.ground or picture.ground,
-        )
+        view = {name: value for name, value in picture.view.items() if name not in selection.view}
+        if "environment" in view:  # it must lie below an asset root: the user has not typed it
+            Roots.of_file(Path("x"), selection.asset_roots).check(view["environment"], Place(str(selection.source)))
+        selection = replace(selection, **view)
     resolve_with = partial(
         rendergraph.resolve.resolve,
         source,
@@ -106,14 +103,6 @@ def _transparent(spec: PipelineSpec) -> list[str]:
     if not found:
         raise UsageError(Problem("RG500", "--transparent: no node of the pipeline has a parameter 'transparent'"))
     return found
-
-
-def _environment(selection: Selection, picture: PictureMetadata) -> Path | None:
-    """Return the environment that a picture names, which must lie below an asset root: the user has not typed it."""
-    path = picture.environment
-    if path is not None:
-        Roots.of_file(Path("x"), selection.asset_roots).check(path, Place(str(selection.source)))
-    return path
 
 
 def link(resolved: Resolved) -> Linked:

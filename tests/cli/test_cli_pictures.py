@@ -42,15 +42,20 @@ def test_a_picture_draws_itself_again(cli: Any, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_it_knows_its_camera_its_frame_and_its_scene(cli: Any, turning: str, tmp_path: Path) -> None:
-    assert cli("run", turning, *SMALL, "--camera", "two", "--fps", "24", "--frames", "7-7", "-o", "a.png").code == 0
+    shutter = ("--shutter", "0.25")
+    assert (
+        cli("run", turning, *SMALL, "--camera", "two", "--fps", "24", "--frames", "7-7", *shutter, "-o", "a.png").code
+        == 0
+    )
     said = read_metadata(tmp_path / "a.png")
+    assert said["shutter"] == "0.25"
     assert (said["camera"], said["frame"], said["fps"], said["folder"]) == ("two", "7", "24", "own")
     assert cli("run", "a.png", "-o", "b.png").code == 0
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert cli("run", "a.png", "--frames", "1", "-o", "first.png").code == 0
     assert not np.array_equal(read(tmp_path / "a.png"), read(tmp_path / "first.png"))
     frame = rg.load(tmp_path / "a.png").render()
-    assert frame.number == 7
+    assert (frame.number, rg.load(tmp_path / "a.png").link().graph.facts.camera.shutter) == (7, 0.25)
     np.testing.assert_array_equal(frame["image"][..., :3], read(tmp_path / "a.png"))
 
 
@@ -64,7 +69,14 @@ def test_every_verb_takes_a_picture(cli: Any, turning: str, verb: str) -> None:
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("folder", "/"), ("folder", "../secret"), ("environment", "../secret/sky.hdr"), ("frame", "x"), ("fps", "nan")],
+    [
+        ("folder", "/"),
+        ("folder", "../secret"),
+        ("environment", "../secret/sky.hdr"),
+        ("frame", "x"),
+        ("fps", "nan"),
+        ("shutter", "9"),
+    ],
 )
 def test_what_a_picture_says_reaches_nothing_outside(
     cli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, key: str, value: str
@@ -79,8 +91,10 @@ def test_what_a_picture_says_reaches_nothing_outside(
     pipeline = pipeline.replace("scene: shapes", "scene: ./scene.yaml") if key == "folder" else pipeline
     pixels = np.zeros((2, 2, 3), np.uint8)
     images.write(Path("hostile.png"), pixels, metadata={"rendergraph:pipeline": pipeline, f"rendergraph:{key}": value})
-    result = cli("check", "hostile.png") if key in ("frame", "fps") else cli("run", "hostile.png", "-o", "x.png")
-    if key in ("frame", "fps"):
+    result = (
+        cli("check", "hostile.png") if key in ("frame", "fps", "shutter") else cli("run", "hostile.png", "-o", "x.png")
+    )
+    if key in ("frame", "fps", "shutter"):
         assert result.code == 0, result
     else:
         assert result.code == 3

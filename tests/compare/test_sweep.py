@@ -11,12 +11,14 @@ from typing import Any
 import fastjsonschema
 import numpy as np
 import pytest
+from msgspec import structs
 
 import rendergraph as rg
 from rendergraph.cli.compare import summary
 from rendergraph.compare.batches import batches
 from rendergraph.compare.engine import sweep
 from rendergraph.compare.export.table import csv_text
+from rendergraph.compare.fingerprint import run_key
 from rendergraph.compare.prepare import SweepOptions, prepare
 from rendergraph.compare.report import sweep_page
 from rendergraph.compare.results import pareto
@@ -116,6 +118,7 @@ def test_another_study_does_not_write_over_the_pictures_of_this_one(
         (truth, {}, "pipeline forward, not shading-flat"),
         (base, {"reference": truth}, "reference shadows.taps=1, not shading-flat"),
         (base, {"frame": 2}, "frame 1, not 2"),
+        (base.select(shutter=0.5), {}, r"shutter None, not 0\.5"),
     ]
     for other, options, message in others:
         with pytest.raises(InputError, match=rf"RG504 .* of another study: .*{message}.*; use another folder: -o .*-2"):
@@ -395,6 +398,17 @@ def test_results_are_kept_only_as_long_as_what_they_were_drawn_from(gl: rg.Sessi
         file = tmp_path / name
         file.write_text(file.read_text().replace(old, new))
         assert drawn() == 0, name
+
+
+def test_what_is_chosen_beside_the_file_decides_a_picture(base: rg.Pipeline) -> None:
+    views: list[dict[str, Any]] = [{}, {"camera": "eye=0,1,5 target=0,1,0"}, {"shutter": 0.0}, {"shutter": 0.5}]
+    planned = [base.select(**view).check() for view in (*views, {"ground": True})]
+    planned.append(structs.replace(planned[0], linked=with_variant(planned[0].linked)))
+    assert len({run_key(one, 1, "") for one in planned}) == len(planned)
+
+
+def with_variant(linked: Any) -> Any:
+    return structs.replace(linked, selection=structs.replace(linked.selection, variant="sea"))
 
 
 @pytest.mark.slow
