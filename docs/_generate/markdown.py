@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from html import escape
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -14,6 +15,22 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     used = [index for index in range(len(heads)) if any(row[index] for row in cells)]
     lines = [[heads[index] for index in used], ["---"] * len(used), *([row[index] for index in used] for row in cells)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+def long_table(heads: Sequence[str], rows: Iterable[tuple[str, str]]) -> str:
+    """A table of names and plain text as HTML: of some 20,000 rows in Markdown Sphinx takes a third of its time."""
+    lines = [f"<tr><td><code>{escape(name)}</code></td><td>{_spans(text)}</td></tr>" for name, text in rows]
+    head = "".join(f"<th>{escape(word)}</th>" for word in heads)
+    body = "\n".join(["<tbody>", *lines, "</tbody>"])
+    return (
+        f'<div class="table-wrapper"><table class="docutils">\n<thead><tr>{head}</tr></thead>\n{body}\n</table></div>\n'
+    )
+
+
+def _spans(text: str) -> str:
+    """Text in one line as HTML, with what stands between backticks as code."""
+    parts = escape(" ".join(text.split())).split("`")
+    return "".join(f"<code>{part}</code>" if index % 2 else part for index, part in enumerate(parts))
 
 
 def _cell(value: object) -> str:

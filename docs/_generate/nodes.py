@@ -23,7 +23,7 @@ from rendergraph.reference import (
 from rendergraph.reference.python import signature
 from rendergraph.session import Selection
 
-from .markdown import block, code, folded, listing, page, prose, table
+from .markdown import block, code, folded, listing, long_table, page, prose, table
 from .pictures import Studio, View, catalog, example_and_base, exhibit
 
 STEPS = {"param": "uniform", "define": "compiled in", "structural": "plan"}
@@ -177,7 +177,7 @@ def _in_scope(found: NodeType) -> str:
     tables = [
         folded(
             f"step {step['step']}: " + ", ".join(f"<code>{name}</code>" for name in step["shaders"].values()),
-            table(("in scope", "from"), [(code(one["name"]), prose(one["source"])) for one in step["scope"]]),
+            long_table(("in scope", "from"), [(" ".join(one["name"].split()), one["source"]) for one in step["scope"]]),
         )
         for step in programs
     ]

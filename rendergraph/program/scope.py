@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from rendergraph.catalog import NodeType
@@ -212,9 +213,12 @@ class _Scope:
         return f"its own '{port}'{last}" if node == self.step.node else f"{read.resource}{last}"
 
 
+_declared = lru_cache(8)(globals_of)  # a stage's text is asked for its uniforms, inputs and outputs
+
+
 def _globals(source: SourceText, storage: str) -> Iterator[tuple[Global, Origin]]:
     text = source.text
-    for one in globals_of(text).declared:
+    for one in _declared(text).declared:
         if one.storage == storage:
             yield one, source.origins[text.count("\n", 0, one.at)]
 

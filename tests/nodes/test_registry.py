@@ -66,7 +66,14 @@ def test_docs_are_sentences(name: str) -> None:
     assert list(doc_problems(CATALOG.get(name).cls)) == []
 
 
-ALIKE = {"forward_multipass", "forward_shadow_volumes", "deferred_stencil_lights", "weighted_blended", "depth_peeling"}
+ALIKE = {
+    "forward_multipass",
+    "forward_shadow_volumes",
+    "deferred_stencil_lights",
+    "weighted_blended",
+    "depth_peeling",
+    "deferred_multisampled",
+}
 """Lighting nodes with the variants of `forward_lighting` and `deferred_lighting`, which take a tenth of the tests' time."""
 
 
