@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct, field
@@ -245,13 +245,12 @@ class Executable(Struct, eq=False, dict=True):
         """A drawing begins: what `update` set in the one before does not hold."""
         for region in self.memory.regions.values():
             region.set()
-        for (node, _), cells in self._cells.items():
-            for cell in cells:
-                self._write(node, cell, cell.draw.uniforms[cell.name])
+        for cell in chain.from_iterable(self._cells.values()):
+            self.write_uniform(cell, cell.draw.uniforms[cell.name])
         self.stale = set(self.contents)
 
-    def set_uniform(self, node: str, name: str, value: UniformValue) -> str | None:
-        """Set a uniform of a node for `update`; return why its program cannot take the value."""
+    def cells(self, node: str, name: str) -> list[_Cell]:
+        """The places of a uniform of a node in programs that run in every frame, for `write_uniform`."""
         if (node, name) not in self._cells:
             found = [
                 _Cell(compiled.step.key, draw, before + name)
@@ -264,17 +263,18 @@ class Executable(Struct, eq=False, dict=True):
             self._cells[node, name] = found
             if found:
                 self.assemble()
-        for cell in self._cells[node, name]:
+        return self._cells[node, name]
+
+    def set_uniform(self, node: str, name: str, value: UniformValue) -> str | None:
+        """Set a uniform of a node for `update`; return why its program cannot take the value."""
+        for cell in self.cells(node, name):
             if (mismatch := uniform_mismatch(cell.draw.program.uniforms[cell.name], value)) is not None:
                 return mismatch
-            self._write(node, cell, value)
+            self.write_uniform(cell, value)
         return None
 
-    def drives(self, node: str, name: str) -> bool:
-        """Whether `set_uniform` of this uniform has an effect: a program that runs in every frame reads it."""
-        return bool(self._cells[node, name])
-
-    def _write(self, node: str, cell: _Cell, value: UniformValue) -> None:
+    def write_uniform(self, cell: _Cell, value: UniformValue) -> None:
+        """Set a uniform in one of its places."""
         if repr(cell.value) != repr(value):
             cell.value, cell.call = value, cell.draw.program.writer(cell.name, value)
             self.touched.add(("step", cell.step))

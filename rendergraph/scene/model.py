@@ -483,12 +483,8 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
     @cached_property
     def node_curves(self) -> tuple[tuple[str, str, Curve], ...]:
         """The keyframes of nodes' parameters: node, parameter and values."""
-        paths = ((path.removeprefix("nodes.").rpartition("."), curve) for path, curve in self.keyframes.items())
-        return tuple(
-            (node, name, curve)
-            for ((node, _, name), curve), path in zip(paths, self.keyframes, strict=True)
-            if path.startswith("nodes.")
-        )
+        driven = ((path[6:].rpartition("."), curve) for path, curve in self.keyframes.items() if path[:6] == "nodes.")
+        return tuple((node, name, curve) for (node, _, name), curve in driven)
 
     @property
     def camera(self) -> Camera | None:

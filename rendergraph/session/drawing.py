@@ -113,7 +113,7 @@ class Drawing(Struct, eq=False, dict=True):
             assert self.camera is not None  # a completed scene has one
             view = view_matrices(self.camera, linked.graph.size)
             if self._driven is not None:
-                self._driven.set(self.executable, moment)
+                self._driven.set(moment)
             begun = perf_counter()
             with activity.limited_draw():
                 options: dict[str, Any] = {"moment": part, "moments": len(each), "timed": self.expanded.options.timed}

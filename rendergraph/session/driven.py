@@ -46,24 +46,33 @@ def checked(graph: Graph, scene: Scene) -> list[Problem]:
 
 
 class Driven:
-    """The driven parameters of a compiled pipeline."""
+    """The driven parameters of a compiled pipeline, with their places in its programs."""
 
     def __init__(self, graph: Graph, scene: Scene, executable: Executable) -> None:
-        active = executable.uniforms
-        self._curves: list[tuple[str, str, Curve, Any]] = []
+        """Find the places; InputError if there is none, or a program cannot take the value."""
+        self._executable = executable
+        self._curves: list[tuple[Curve, bool, int, list[Any]]] = []
         for node, name, curve in scene.node_curves:
-            if node not in graph or name not in active.get(node, ()):
+            if node not in graph or name not in executable.uniforms.get(node, ()):
                 continue  # what it makes is not asked for
             parameter = graph[node].type.cls.parameters()[name]
             fill = int(parameter.glsl[3]) if parameter.glsl.startswith("vec") and curve.values.ndim == 1 else 0
-            self._curves.append((node, name, curve, (parameter.type is int, fill)))
-
-    def set(self, executable: Executable, time: float) -> None:
-        """Set the uniforms to their values at a time."""
-        for node, name, curve, (whole, fill) in self._curves:
-            value = curve.at(time)
-            value = round(value) if whole else (value,) * fill if fill else value
-            mismatch = executable.set_uniform(node, name, value)
-            if mismatch is not None or not executable.drives(node, name):
+            mismatch = executable.set_uniform(node, name, _value(curve, 0.0, parameter.type is int, fill))
+            cells = executable.cells(node, name)
+            if mismatch is not None or not cells:
                 text = mismatch or "no shader that runs in every frame reads it"
                 raise InputError(Problem("RG219", f"keyframes of 'nodes.{node}.{name}': {text}", curve.place))
+            self._curves.append((curve, parameter.type is int, fill, cells))
+
+    def set(self, time: float) -> None:
+        """Set the uniforms to their values at a time."""
+        for curve, whole, fill, cells in self._curves:
+            value = _value(curve, time, whole, fill)
+            for cell in cells:
+                self._executable.write_uniform(cell, value)
+
+
+def _value(curve: Curve, time: float, whole: bool, fill: int) -> Any:
+    """The value of a uniform: rounded for a `whole` number, repeated to `fill` a vector."""
+    value = curve.at(time)
+    return round(value) if whole else (value,) * fill if fill else value

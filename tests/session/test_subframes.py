@@ -67,6 +67,8 @@ def test_a_frame_is_the_mean_of_its_moments(gl: rg.Session, scene: Path) -> None
     assert np.abs(once["image"][..., :3] - shown).max() < 1.5
 
 
+@pytest.mark.slow
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("name", ["forward-msaa", "taa", "hdr", "shown", "bloom", "forward-transparent"])
 def test_every_pipeline_takes_them(gl: rg.Session, scene: Path, name: str) -> None:
     """A ball that moves is blurred in the picture of the display, whatever it is made from."""
@@ -83,6 +85,7 @@ def test_every_pipeline_takes_them(gl: rg.Session, scene: Path, name: str) -> No
     np.testing.assert_array_equal(again, one)  # the means are forgotten
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("name", ["forward", "full"])
 def test_what_stands_still_is_the_single_picture(gl: rg.Session, name: str) -> None:
     pipeline = rg.load(name, scene="cornell_box", size=SIZE, sets=[]).select(shutter=0.5)
