@@ -133,6 +133,10 @@ class Lighting(Node):
     specular_occlusion: bool = define(
         default=True, doc="Occlude the specular environment light less than the diffuse one on smooth surfaces."
     )
+    transparent: bool = structural(
+        default=False,
+        doc="Leave out what is behind all surfaces, and let alpha say how much they cover, glass in part.",
+    )
 
     if not TYPE_CHECKING:
 
@@ -237,7 +241,7 @@ class Lighting(Node):
             objects = [one.name for one in steps.facts.objects if one.blended and not one.hidden and not transmits(one)]
             self.copy_behind(steps, out["radiance"])
             behind: dict[str, Any] = reads | {"behind": self.behind.sampled("trilinear")}
-            transparent = {"TRANSPARENT": 1} if getattr(self, "transparent", False) else {}
+            transparent = {"TRANSPARENT": 1} if self.transparent else {}
             if self.environment_reads(steps):
                 behind["brdf_table"] = self.brdf_table.sampled("linear")
             steps.geometry(
@@ -350,10 +354,6 @@ class SurfaceLighting(Lighting):
         min=0,
         max=1,
         doc="Blur of the backdrop: the roughness of a surface that would reflect it so.",
-    )
-    transparent: bool = structural(
-        default=False,
-        doc="Leave out what is behind all surfaces, and let alpha say how much they cover, glass in part.",
     )
     blended: bool = structural(
         default=True, doc="Draw transparent surfaces, too; otherwise a `forward_transparent` can draw them."
