@@ -28,6 +28,8 @@ from rendergraph.api import (
 )
 from rendergraph.api import Any as AnyTexel
 
+from ..lighting._lighting import has_layer
+
 Color = float | tuple[float, float, float]
 _TABLE = 512, 256  # directions of the environment to choose from
 _BATCH = 4  # paths whose random numbers depend on each other, so that they cover a pixel evenly
@@ -110,7 +112,11 @@ class PathTraced(Node):
         doc="Power of each emitting triangle.",
     )
     brdf_table = Internal(
-        AnyTexel, format="rg16", size=(64, 64), kept=True, doc="Split-sum BRDF factors, for a shared diffuse lobe."
+        AnyTexel,
+        format=lambda node, facts: "rgba16" if has_layer(facts, "sheen") else "rg16",
+        size=(64, 64),
+        kept=True,
+        doc="Split-sum BRDF factors, for a shared diffuse lobe and for sheen.",
     )
     first_depth = Internal(Depth, format="depth32f", clear=0.0, doc="The depth if nobody reads it.")
 
@@ -198,12 +204,12 @@ class PathTraced(Node):
             )
             self._add_tree(steps, self.environment_table, self.environment_tree, 0)
         needs = steps.needs("shading")
-        if self.diffuse_lobe == "shared" and "phong" not in needs and "nothing" not in needs:
+        has_sheen = has_layer(steps.facts, "sheen")
+        if (self.diffuse_lobe == "shared" or has_sheen) and "phong" not in needs and "nothing" not in needs:
             reads["brdf_table"] = self.brdf_table.sampled("linear")
             defines["MULTIPLE_SCATTERING"] = 0
-            steps.fullscreen(
-                "../lighting/brdf_table.frag", out=self.brdf_table, defines={"TABLE_SAMPLES": 512}, label="table"
-            )
+            table = {"TABLE_SAMPLES": 512, **({"SHEEN_TABLE": 1} if has_sheen else {})}
+            steps.fullscreen("../lighting/brdf_table.frag", out=self.brdf_table, defines=table, label="table")
         emits = _emitters(steps.facts) > 0 and self.sources in ("all", "emissive")
         if emits:
             side = _table_side(self, steps.facts)

@@ -23,7 +23,7 @@ from rendergraph.textures import FORMATS, TextureDesc
 
 _FLAGS = (
     *("casts_shadow", "hidden", "double_sided", "masked", "blended", "mirrored", "unlit"),
-    *("has_tangents", "has_uv0", "has_uv1", "shadow_catcher"),
+    *("has_tangents", "has_uv0", "has_uv1", "transmits", "shadow_catcher"),
 )
 FLAGS = {name: 1 << bit for bit, name in enumerate(_FLAGS)}
 """Bits of an instance's flags, in GLSL `SCENE_CASTS_SHADOW` and so on."""
@@ -191,6 +191,8 @@ def data_macros(scene: Scene, packed: PackedScene, arrays: TextureArrays) -> dic
     macros |= {f"SCENE_{slot.upper()}_ARRAYS": str(bits) for slot, bits in used.items() if bits}
     if any(map(scene.has_grain, scene.materials)):
         macros["SCENE_GRAIN"] = "1"
+    for material in {placed.material for placed in scene.objects}:
+        macros |= {f"SCENE_ANY_{layer.upper()}": "1" for layer in scene.layers(scene.materials[material])}
     for mode, name in (("mask", "SCENE_ANY_MASKED"), ("blend", "SCENE_ANY_BLENDED")):
         if mode in packed.alpha_mode:
             macros[name] = "1"
@@ -247,6 +249,7 @@ def _flags(scene: Scene, number: int, packed: PackedScene) -> int:
         "has_tangents": mesh.tangents is not None and ("normal" in material.textures or scene.has_grain(material)),
         "has_uv0": mesh.uv0 is not None,
         "has_uv1": mesh.uv1 is not None,
+        "transmits": "transmission" in scene.layers(material),
         "shadow_catcher": material.shadow_catcher,
     }
     return reduce(or_, (FLAGS[name] for name, yes in holds.items() if yes), 0)

@@ -3,6 +3,7 @@
 // same number. Triangles are numbered within their mesh, as in `gl_PrimitiveID` of a geometry pass. Barycentrics are
 // the weights of the triangle's second and third vertex.
 #include <material_surface.glsl>
+#include <layers.glsl>
 #include <math.glsl>
 #include <scene_textures.glsl>
 #include <surface.glsl>
@@ -29,6 +30,51 @@ void scene_tangent_frame(
     uv_tangent_frame(
         normal, corners[1] - corners[0], corners[2] - corners[0], uv_a, uv_b, tangent, bitangent);
 }
+
+#if defined(SCENE_LAYERS) && defined(HAS_LAYERS)
+// What the textures of the layers hold at a point, as `layer_texels` of `fragment_layers.glsl`. `normal` is that of the
+// geometry, with its tangent frame.
+LayerTexels scene_layer_texels(
+    int instance, SceneCoordinates c, MaterialData m, vec3 normal, vec3 tangent, vec3 bitangent, bool flip_normal) {
+    LayerTexels layers = LayerTexels(vec2(1.0), vec4(1.0), vec2(1.0), vec2(1.0), normal);
+#ifdef SCENE_TEXTURES
+    vec4 texel;
+#endif
+#if defined(SCENE_CLEARCOAT_ARRAYS) && defined(CLEARCOAT_LAYER)
+    if (scene_texel(instance, CLEARCOAT_SLOT, SCENE_CLEARCOAT_ARRAYS, c, texel)) layers.clearcoat.x = texel.r;
+#endif
+#if defined(SCENE_CLEARCOAT_ROUGHNESS_ARRAYS) && defined(CLEARCOAT_LAYER)
+    if (scene_texel(instance, CLEARCOAT_ROUGHNESS_SLOT, SCENE_CLEARCOAT_ROUGHNESS_ARRAYS, c, texel)) layers.clearcoat.y = texel.g;
+#endif
+#if defined(SCENE_SHEEN_COLOR_ARRAYS) && defined(SHEEN_LAYER)
+    if (scene_texel(instance, SHEEN_COLOR_SLOT, SCENE_SHEEN_COLOR_ARRAYS, c, texel)) layers.sheen.rgb = texel.rgb;
+#endif
+#if defined(SCENE_SHEEN_ROUGHNESS_ARRAYS) && defined(SHEEN_LAYER)
+    if (scene_texel(instance, SHEEN_ROUGHNESS_SLOT, SCENE_SHEEN_ROUGHNESS_ARRAYS, c, texel)) layers.sheen.a = texel.a;
+#endif
+#if defined(SCENE_IRIDESCENCE_ARRAYS) && defined(IRIDESCENCE_LAYER)
+    if (scene_texel(instance, IRIDESCENCE_SLOT, SCENE_IRIDESCENCE_ARRAYS, c, texel)) layers.iridescence.x = texel.r;
+#endif
+#if defined(SCENE_IRIDESCENCE_THICKNESS_ARRAYS) && defined(IRIDESCENCE_LAYER)
+    if (scene_texel(instance, IRIDESCENCE_THICKNESS_SLOT, SCENE_IRIDESCENCE_THICKNESS_ARRAYS, c, texel)) layers.iridescence.y = texel.g;
+#endif
+#if defined(SCENE_TRANSMISSION_ARRAYS) && defined(TRANSMISSION_LAYER)
+    if (scene_texel(instance, TRANSMISSION_SLOT, SCENE_TRANSMISSION_ARRAYS, c, texel)) layers.transmission.x = texel.r;
+#endif
+#if defined(SCENE_THICKNESS_ARRAYS) && defined(TRANSMISSION_LAYER)
+    if (scene_texel(instance, THICKNESS_SLOT, SCENE_THICKNESS_ARRAYS, c, texel)) layers.transmission.y = texel.g;
+#endif
+#if defined(SCENE_CLEARCOAT_NORMAL_ARRAYS) && defined(CLEARCOAT_LAYER)
+    if (scene_texel(instance, CLEARCOAT_NORMAL_SLOT, SCENE_CLEARCOAT_NORMAL_ARRAYS, c, texel)) {
+        vec3 bump = texel.xyz * 2.0 - 1.0;
+        bump.xy *= m.clearcoat.z;
+        layers.clearcoat_normal = normalize(mat3(tangent, bitangent, normal) * bump);
+    }
+#endif
+    if (flip_normal) layers.clearcoat_normal = -layers.clearcoat_normal;
+    return layers;
+}
+#endif
 
 // Everything a shading model reads: the surface that a geometry pass shades there, seen along -view_dir. Nothing is
 // discarded: `scene_alpha` is compared with the material's cutoff by the caller, where there is SCENE_MASKED.
@@ -88,13 +134,20 @@ Surface scene_surface(int instance, int triangle, vec2 barycentrics, vec3 view_d
 #ifdef SCENE_EMISSIVE_ARRAYS
     if (scene_texel(instance, EMISSIVE_SLOT, SCENE_EMISSIVE_ARRAYS, c, texel)) texels.emissive = texel.rgb;
 #endif
-#ifdef NEEDS_GRAIN
+#if defined(NEEDS_GRAIN) || defined(SCENE_CLEARCOAT_NORMAL_ARRAYS)
     bool needs_frame = true;
 #else
     bool needs_frame = texels.has_normal;
 #endif
     if (needs_frame) scene_tangent_frame(instance, v, w, corners, s.normal, s.tangent, s.bitangent);
     bool flip_normal = !is_front && (flags & SCENE_DOUBLE_SIDED) != 0;
+#if defined(SCENE_LAYERS) && defined(HAS_LAYERS)
+    LayerTexels layers = scene_layer_texels(instance, c, m, s.normal, s.tangent, s.bitangent, flip_normal);
+#endif
     material_surface(s, m, texels, flip_normal, (flags & SCENE_UNLIT) == 0);
+#if defined(SCENE_LAYERS) && defined(HAS_LAYERS)
+    vec4 rows[3] = scene_instances[instance].rows;
+    material_layers(s, m, layers, pow(abs(dot(rows[0].xyz, cross(rows[1].xyz, rows[2].xyz))), 1.0 / 3.0));
+#endif
     return s;
 }

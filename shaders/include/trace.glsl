@@ -34,16 +34,17 @@ bool visible_hit(vec3 origin, vec3 direction, float nearest, float farthest, out
 
 // Whether anything of these flags lies between two distances. Transparent surfaces do not count.
 bool any_hit(vec3 origin, vec3 direction, float nearest, float farthest, int wanted) {
+    const int PASSING = SCENE_BLENDED | SCENE_TRANSMITS;
     Hit hit;
 #ifdef SCENE_ANY_MASKED
-    if (trace(origin, direction, nearest, farthest, wanted, SCENE_BLENDED | SCENE_MASKED, true, hit)) return true;
+    if (trace(origin, direction, nearest, farthest, wanted, PASSING | SCENE_MASKED, true, hit)) return true;
     bool is_hit = trace(origin, direction, nearest, farthest, wanted | SCENE_MASKED, 0, false, hit);
     while (is_hit && trace_is_cut_away(hit)) {
         is_hit = trace(origin, direction, hit.distance, farthest, wanted | SCENE_MASKED, 0, false, hit);
     }
     return is_hit;
 #else
-    return trace(origin, direction, nearest, farthest, wanted, SCENE_BLENDED, true, hit);
+    return trace(origin, direction, nearest, farthest, wanted, PASSING, true, hit);
 #endif
 }
 

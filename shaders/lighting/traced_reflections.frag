@@ -1,8 +1,10 @@
 // Radiance in the specular lobe of the picture's surfaces, by rays in directions that the lobe reflects.
+#define SCENE_LAYERS
 #include <brdf.glsl>
 #include <brdf_table.glsl>
 #include <depth_surface.glsl>
 #include <frame.glsl>
+#include <layered_light.glsl>
 #include <radiance.glsl>
 #include <sampled_directions.glsl>
 #include <traced_light.glsl>
@@ -43,6 +45,9 @@ vec3 arriving_radiance(vec3 origin, vec3 direction, float angle, ivec2 pixel, in
     vec3 leaving = s.position + s.geometric_normal * ray_offset(s.position, hit.distance), light_dir;
     vec3 irradiance = irradiance_from_one_light(s, leaving, random_shift(pixel + 16384, seed).x, light_dir);
     ReflectedLight reflectance = shade(s, light_dir);
+#ifdef HAS_LAYERS
+    reflectance = layered_light(s, light_dir, reflectance);
+#endif
     ReflectedLight direct = ReflectedLight(reflectance.diffuse * irradiance, reflectance.specular * irradiance);
     return radiance_of(s, direct, environment_lighting(s));
 }

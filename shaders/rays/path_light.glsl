@@ -1,4 +1,5 @@
 // What paths of light collect: the part of it that is wanted, and the light that a surface reflects.
+#include <layered_light.glsl>
 #include <lights.glsl>
 #include <luminance.glsl>
 #include <math.glsl>
@@ -64,6 +65,9 @@ float power_heuristic(float density, float other) {
 
 vec3 reflected_part(Surface s, vec3 light_dir) {
     ReflectedLight found = shade(s, light_dir);
+#ifdef HAS_LAYERS
+    found = layered_light(s, light_dir, found);
+#endif
 #if TERMS == TERMS_DIFFUSE
     return found.diffuse;
 #elif TERMS == TERMS_SPECULAR
@@ -83,7 +87,14 @@ int choose_light(Surface s, float xi, out float chance, out float sum) {
         vec3 to_light;
         vec3 irradiance = irradiance_from(lights[i], s.position, to_light);
         bool is_lit = dot(s.geometric_normal, to_light) > 0.0;
-        float weight = is_lit ? luminance_of(irradiance) * max(dot(s.normal, to_light), 0.05) : 0.0;
+        float cosine = dot(s.normal, to_light);
+#ifdef TRANSMISSION_LAYER
+        if (s.transmission > 0.0) {  // thin walls are lit from behind, too
+            is_lit = is_lit || s.thickness == 0.0;
+            cosine = abs(cosine);
+        }
+#endif
+        float weight = is_lit ? luminance_of(irradiance) * max(cosine, 0.05) : 0.0;
         sum += weight;
         float share = sum > 0.0 ? weight / sum : 0.0;
         bool takes = xi < share;

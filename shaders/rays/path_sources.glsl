@@ -73,15 +73,15 @@ struct SourceSample {
     int casting;     // flags of what casts shadows
 };
 
-// Chooses a source by `chances` and a point or direction of it. `origin` is where the shadow ray begins.
+// Chooses a source by `chances` and a point or direction of it. The shadow ray begins at the surface.
 SourceSample sample_source(
-    Surface s, vec3 origin, vec3 chances, float choice, int light, float light_chance, uint point, uint dimension) {
+    Surface s, vec3 chances, float choice, int light, float light_chance, uint point, uint dimension) {
     SourceSample found = SourceSample(vec3(0.0), s.normal, 0.0, false, vec3(0.0), 1e30, 0);
     if (choice < chances.x) {
 #ifdef USES_LIGHTS
         found.light = irradiance_from(lights[light], s.position, found.light_dir) / (chances.x * light_chance);
         bool has_position = lights[light].position.w > 0.0;
-        found.ray = has_position ? lights[light].position.xyz - origin : found.light_dir;
+        found.ray = has_position ? lights[light].position.xyz - s.position : found.light_dir;
         found.reach = has_position ? 1.0 : found.reach;
         found.casting = SCENE_CASTS_SHADOW;
 #endif
@@ -118,7 +118,7 @@ SourceSample sample_source(
                 * (SPREAD_LIGHT * opacity(emitter.instance, emitter.triangle, barycentrics)
                     / max(found.density, 1e-37));
         }
-        found.ray = offset_ray(at, normal) - origin;
+        found.ray = offset_ray(at, normal) - s.position;
         found.reach = 1.0;
 #endif
     }

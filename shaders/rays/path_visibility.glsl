@@ -15,19 +15,42 @@ float opacity(int instance, int triangle, vec2 barycentrics) {
     return opaque;
 }
 
-// Fraction of light that arrives from another point.
-float visibility(vec3 origin, vec3 direction, float farthest, int wanted) {
+#ifdef TRANSMISSION_LAYER
+// Light that passes straight through a transmissive surface: all of it through a thin wall, and half of it, as a factor,
+// through each of the two sides of a volume.
+vec3 passing_light(Hit hit) {
+    MaterialData m = materials[MATERIAL_INDEX(scene_instances[hit.instance].material)];
+    float factor = m.transmission.x * (1.0 - m.surface.x);
+#ifdef SCENE_TRANSMISSION_ARRAYS
+    ivec3 v = scene_triangle(hit.instance, hit.triangle);
+    vec4 texel;
+    SceneCoordinates c = scene_coordinates(v, scene_weights(hit.barycentrics));
+    if (scene_texel(hit.instance, TRANSMISSION_SLOT, SCENE_TRANSMISSION_ARRAYS, c, texel)) factor *= texel.r;
+#endif
+    vec3 passed = m.base_color.rgb * (factor * (1.0 - m.extra.x));
+    return m.transmission.y > 0.0 ? sqrt(passed) : passed;
+}
+#endif
+
+// Fraction of light that arrives from another point. Light that casts shadows (SCENE_CASTS_SHADOW in `wanted`) is that
+// of punctual lights, which no path finds that is refracted: it passes straight through what transmits light.
+vec3 visibility(vec3 origin, vec3 direction, float farthest, int wanted) {
     Hit hit;
-#if defined(SCENE_ANY_MASKED) || defined(SCENE_ANY_BLENDED)
-    const int PASSING = SCENE_MASKED | SCENE_BLENDED;
-    float passed = 1.0, nearest = 0.0;
+#if defined(SCENE_ANY_MASKED) || defined(SCENE_ANY_BLENDED) || defined(TRANSMISSION_LAYER)
+    int passing = SCENE_MASKED | SCENE_BLENDED | (wanted != 0 ? SCENE_TRANSMITS : 0);
+    vec3 passed = vec3(1.0);
+    float nearest = 0.0;
     bool ends;
-    while (passed > 0.0 && trace(origin, direction, nearest, farthest, wanted, 0, true, PASSING, hit, ends)) {
+    while (max(max(passed.r, passed.g), passed.b) > 0.0 && trace(origin, direction, nearest, farthest, wanted, 0, true, passing, hit, ends)) {
         nearest = hit.distance;
-        passed *= ends ? 0.0 : 1.0 - opacity(hit.instance, hit.triangle, hit.barycentrics);
+        vec3 stopped = vec3(opacity(hit.instance, hit.triangle, hit.barycentrics));
+#ifdef TRANSMISSION_LAYER
+        if (wanted != 0 && scene_has(hit.instance, SCENE_TRANSMITS)) stopped *= 1.0 - passing_light(hit);
+#endif
+        passed *= ends ? vec3(0.0) : 1.0 - stopped;
     }
     return passed;
 #else
-    return trace(origin, direction, 0.0, farthest, wanted, 0, true, hit) ? 0.0 : 1.0;
+    return trace(origin, direction, 0.0, farthest, wanted, 0, true, hit) ? vec3(0.0) : vec3(1.0);
 #endif
 }

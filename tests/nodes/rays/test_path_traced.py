@@ -107,23 +107,57 @@ MATERIALS = {
 }
 
 
+LAYERS = {
+    "coat": "base_color: [0, 0, 0], specular: 0, clearcoat: 1, clearcoat_roughness: 0.4",
+    "cloth": "base_color: [0, 0, 0], specular: 0, sheen_color: [1, 1, 1], sheen_roughness: 0.6",
+    "pane": "base_color: [1, 1, 1], roughness: 0.3, transmission: 1",
+    "grating": "base_color: [1, 1, 1], roughness: 0.5, metallic: 1, iridescence: 1, iridescence_ior: 1.8",
+}
+
+
+def sheen_albedo(roughness: float, angle: float) -> float:
+    """Directional albedo of white sheen in float64 (Estevez and Kulla 2017), from midpoints in the root of NoL."""
+    alpha, n_v = roughness**2, np.cos(angle)
+    t = (1 - alpha) ** 2
+    a, b, c = (low + (high - low) * t for low, high in ((21.5473, 25.3245), (3.82987, 3.32435), (0.19823, 0.16801)))
+    d, e = (low + (high - low) * t for low, high in ((-1.97760, -1.27393), (-4.32054, -4.85967)))
+
+    def masking(x: Any) -> Any:
+        fit = lambda x: a / (1 + b * x**c) + d * x + e  # noqa: E731 - as the paper writes it
+        return np.exp(np.where(x < 0.5, fit(x), 2 * fit(0.5) - fit(np.maximum(1 - x, 1e-5))))
+
+    u, azimuth = np.meshgrid((np.arange(400) + 0.5) / 400, (np.arange(400) + 0.5) / 400 * np.pi)
+    n_l = u**2
+    dot = np.sqrt((1 - n_l**2) * (1 - n_v**2)) * np.cos(azimuth) + n_l * n_v
+    n_h = np.minimum((n_l + n_v) / np.sqrt(2 + 2 * dot), 1)
+    lobe = (2 + 1 / alpha) * np.sqrt(1 - n_h**2) ** (1 / alpha) / (2 * np.pi)
+    return float((lobe / ((1 + masking(n_l) + masking(n_v)) * 4 * n_v) * 2 * u).mean() * 2 * np.pi)
+
+
 def furnace(
-    session: rg.Session, folder: Path, settings: dict[str, Any], degrees: float, samples: int, **options: Any
+    session: rg.Session,
+    folder: Path,
+    settings: dict[str, Any],
+    degrees: float,
+    samples: int,
+    materials: dict[str, str] = MATERIALS,
+    **options: Any,
 ) -> dict[str, float]:
     """The mean radiance of a tile of each material, seen under an angle, with light of 1 from all sides."""
     slope = np.radians(degrees)
     eye = f"[0, {5 * np.cos(slope)}, {5 * np.sin(slope)}]"
     text = f"cameras: {{main: {{height: 0.5, eye: {eye}, target: [0, 0, 0], up: [0, 0, -1]}}}}\n"
     text += "lights: {none: {type: point, intensity: 0, at: [0, 9, 0]}}\nmaterials:\n"
-    text += "".join(f"  {name}: {{{values}}}\n" for name, values in MATERIALS.items())
+    text += "".join(f"  {name}: {{{values}}}\n" for name, values in materials.items())
     text += "objects:\n"
-    for number, name in enumerate(MATERIALS):
-        text += f"  {name}: {{shape: plane, size: [0.98, 9], at: [{number - 2.5}, 0, 0], material: {name}}}\n"
+    for number, name in enumerate(materials):
+        text += f"  {name}: {{shape: plane, size: [0.98, 9], at: [{number - len(materials) / 2 + 0.5}, 0, 0], material: {name}}}\n"
     given = {"max_bounces": 0, "samples": samples, "ambient": 1, "antialiasing": False, **settings}
-    image = light(session, scene_file(folder, text), given, size=(72, 6), **options)
-    assert abs(image - image[..., :1]).max() < 1e-5
+    image = light(session, scene_file(folder, text), given, size=(12 * len(materials), 6), **options)
+    if materials is MATERIALS:
+        assert abs(image - image[..., :1]).max() < 1e-5
     # A tile is 12 pixels wide, of which the outer ones show its edge.
-    return {name: float(image[:, 12 * i + 1 : 12 * i + 11].mean()) for i, name in enumerate(MATERIALS)}
+    return {name: float(image[:, 12 * i + 1 : 12 * i + 11].mean()) for i, name in enumerate(materials)}
 
 
 def albedos(degrees: float) -> dict[str, float]:
@@ -143,6 +177,102 @@ def albedos(degrees: float) -> dict[str, float]:
 def test_every_lobe_reflects_its_directional_albedo(session: rg.Session, tmp_path: Path, degrees: float) -> None:
     found = furnace(session, tmp_path, {}, degrees, 256)
     assert found == pytest.approx(albedos(degrees), rel=0.01)
+
+
+def layer_albedos(degrees: float) -> dict[str, float]:
+    angle = np.radians(degrees)
+    return {
+        "coat": microfacets(0.4, angle, 0.04),
+        "cloth": min(sheen_albedo(0.6, angle), 1.0),
+        "pane": microfacets(0.3, angle, 1.0),
+        "grating": microfacets(0.5, angle, 1.0),
+    }
+
+
+@pytest.mark.parametrize(("samples", "error"), [(64, 0.02), pytest.param(2048, 0.003, marks=pytest.mark.nightly)])
+def test_every_layer_reflects_and_transmits_its_albedo(
+    session: rg.Session, tmp_path: Path, samples: int, error: float
+) -> None:
+    """A film on a perfect mirror keeps all light, and a thin pane lets through what it does not reflect."""
+    found = furnace(session, tmp_path, {"background": 1}, 50, samples, LAYERS)
+    expected = layer_albedos(50)
+    assert {name: found[name] for name in ("coat", "cloth", "pane")} == pytest.approx(
+        {name: expected[name] for name in ("coat", "cloth", "pane")}, rel=error
+    )
+
+
+VIEW = """
+lights: {none: {type: point, intensity: 0, at: [0, 9, 0]}}
+cameras: {main: {height: %s, eye: [0, 0, 5], target: [0, 0, 0]}}
+"""
+
+
+def test_a_glass_ball_neither_takes_nor_adds_light(session: rg.Session, tmp_path: Path) -> None:
+    """Where total reflection, refraction and dispersion are all right, the ball is invisible in white light."""
+    text = VIEW % 1.5 + "materials: {glass: {base_color: 1, roughness: 0, ior: 1.7, %s}}\n"
+    text += "objects: {ball: {shape: sphere, radius: 1, segments: 64, material: glass}}\n"
+    values = "transmission: 1, thickness: 1, dispersion: 4"
+    given = {"max_bounces": 2, "samples": 64, "ambient": 1, "background": 1}
+    image = light(session, scene_file(tmp_path, text % values), given, size=(16, 9))
+    assert image.mean() == pytest.approx(1, abs=0.01)
+    np.testing.assert_allclose(image.mean(axis=(0, 1)), 1, atol=0.03)
+
+
+def test_a_volume_absorbs_along_its_depth(session: rg.Session, tmp_path: Path) -> None:
+    """Light between two boundaries of reflectance F: F + (1 - F)² a / (1 - F a), with a passing through the depth."""
+    text = VIEW % 0.5 + "materials: {ink: {base_color: 1, roughness: 0, transmission: 1, thickness: 9,"
+    text += " attenuation_distance: 2, attenuation_color: [0.2, 0.5, 0.8]}}\n"
+    text += "objects: {slab: {shape: box, size: [3, 3, 1.5], material: ink}}\n"
+    given = {"max_bounces": 0, "samples": 256, "ambient": 1, "background": 1}
+    image = light(session, scene_file(tmp_path, text), given, size=(16, 9))
+    passed, fresnel = np.array([0.2, 0.5, 0.8]) ** (1.5 / 2), 0.04
+    expected = fresnel + (1 - fresnel) ** 2 * passed / (1 - fresnel * passed)
+    np.testing.assert_allclose(image.mean(axis=(0, 1)), expected, rtol=0.01)
+
+
+def test_a_turned_pane_moves_what_is_behind_it_by_snells_law(session: rg.Session, tmp_path: Path) -> None:
+    angle, ior, depth = np.radians(35), 1.5, 0.5
+    text = (
+        VIEW % 2 + f"materials:\n  glass: {{base_color: 1, roughness: 0, ior: {ior}, transmission: 1, thickness: 1}}\n"
+    )
+    text += "  glow: {base_color: 0, emissive: [1, 1, 1]}\nobjects:\n"
+    text += f"  pane: {{shape: box, size: [3, 9, {depth}], rotate_degrees: [0, 35, 0], material: glass}}\n"
+    text += "  glow: {shape: box, size: [9, 9, 0.1], at: [4.5, 0, -4], material: glow}\n"
+    given = {"max_bounces": 0, "samples": 64, "ambient": 0, "sources": "emissive", "antialiasing": False}
+    row = light(session, scene_file(tmp_path, text), given, size=(128, 64))[32, 38:90, 0]
+    edge = (int(np.argmax(np.abs(np.diff(row)))) + 39 - 64) / 32
+    shift = depth * np.sin(angle - np.arcsin(np.sin(angle) / ior)) / np.cos(np.arcsin(np.sin(angle) / ior))
+    assert abs(edge) == pytest.approx(shift, abs=1 / 32)
+
+
+BALLS = {
+    "coat": "base_color: [0.2, 0.3, 0.6], clearcoat: 0.8, clearcoat_roughness: 0.3",
+    "cloth": "base_color: [0.5, 0.2, 0.2], sheen_color: [0.6, 0.7, 0.9], sheen_roughness: 0.5",
+    "film": "base_color: [0.5, 0.5, 0.5], metallic: 1, roughness: 0.4, iridescence: 1, iridescence_ior: 1.4",
+    "grain": "base_color: [0.9, 0.6, 0.3], metallic: 1, roughness: 0.3, anisotropy_strength: 0.7",
+    "gem": "base_color: [0.1, 0.1, 0.1], ior: 2, specular: 0.7, specular_color: [1, 0.5, 0.2], roughness: 0.4",
+}
+
+
+def test_light_of_a_lamp_on_layers_is_that_of_forward_lighting(session: rg.Session, tmp_path: Path) -> None:
+    """Both have no noise there. Facets of the balls are lit by their normals, so they differ near the terminator."""
+    text = "cameras: {main: {height: 2, eye: [0, 0, 9], target: [0, 0, 0]}}\n"
+    text += "lights: {sun: {type: directional, direction: [-0.3, -0.4, -1], intensity: 3}}\nmaterials:\n"
+    text += "".join(f"  {name}: {{{values}}}\n" for name, values in BALLS.items()) + "objects:\n"
+    for number, name in enumerate(BALLS):
+        text += (
+            f"  {name}: {{shape: sphere, segments: 64, radius: 1, at: [{2 * number - 4}, 0, 0], material: {name}}}\n"
+        )
+    file = scene_file(tmp_path, text)
+    given = {"max_bounces": 0, "samples": 1, "sources": "lights", "antialiasing": False, "backdrop": False}
+    traced_light = light(session, file, given, size=(120, 24), environment="none")
+    sets = ("light.lookup=null", "light.environment=null", "light.ambient=0")
+    forward = rg.load("forward", scene=file, size=(120, 24), sets=sets, environment="none")
+    drawn = session.render(forward, outputs=["radiance"])["radiance"][..., :3].astype(np.float64)
+    x, y = np.meshgrid((np.arange(120) % 24 - 11.5) / 12, (np.arange(24) - 11.5) / 12)
+    bright = x**2 + y**2 < 0.5
+    np.testing.assert_allclose(traced_light[bright], drawn[bright], rtol=2e-3, atol=1e-3)
+    assert drawn[bright].mean() > 0.1
 
 
 def test_the_environment_lights_like_constant_light_of_its_radiance(session: rg.Session, tmp_path: Path) -> None:
