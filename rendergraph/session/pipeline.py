@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import wraps
@@ -13,7 +13,10 @@ from msgspec import structs
 
 from rendergraph.catalog import Catalog, find
 from rendergraph.catalog.catalog import own_classes
-from rendergraph.document import shown
+from rendergraph.declare import MeshData
+from rendergraph.document import Source, from_plain, shown
+from rendergraph.errors import Option, Problem, UsageError
+from rendergraph.resolve.spec import flow
 from rendergraph.session import stages
 from rendergraph.session.progress import report_progress
 from rendergraph.session.selection import RenderKeywords, RenderOptions, Selection, each_of
@@ -33,8 +36,8 @@ T = TypeVar("T")
 def load(
     source: str | Path | Mapping[str, Any],
     *,
-    scene: str | Path | Mapping[str, Any] | None = None,
-    environment: str | Path | npt.NDArray[Any] | None = None,
+    scene: str | Path | Mapping[str, Any] | MeshData | None = None,
+    environment: str | Path | Mapping[str, Any] | npt.NDArray[Any] | None = None,
     variant: str | None = None,
     ground: bool = False,
     transparent: bool = False,
@@ -56,7 +59,7 @@ def load(
     """
     pipeline = Pipeline(
         Selection(
-            source=source if isinstance(source, Mapping) else str(source),
+            source=source if isinstance(source, Mapping) else _path("source", source, "a mapping"),
             variant=variant,
             ground=ground,
             transparent=transparent,
@@ -87,6 +90,13 @@ def loads(text: str, **fields: Any) -> Pipeline:
 def as_pipeline(pipeline: Pipeline | str | Path | Mapping[str, Any]) -> Pipeline:
     """Return the pipeline, or the one with that name, file or content."""
     return pipeline if isinstance(pipeline, Pipeline) else load(pipeline)
+
+
+def _path(argument: str, given: object, other: str) -> str:
+    if isinstance(given, str | os.PathLike):
+        return os.fspath(given)
+    text = f"{argument}: expected a name, a file or {other}, got {shown(repr(given))}"
+    raise UsageError(Problem("RG500", text))
 
 
 def _once(stage: Callable[[Pipeline], T]) -> Callable[[Pipeline], T]:
@@ -142,7 +152,7 @@ class Pipeline:
             kind = "type" if key == "type" else "inputs" if getattr(one, "ndim", 0) > 1 else "params"
             keys = name.split(".") if node.startswith("scene.") else ("nodes", node, kind, key)
             changed, plain = changed._with_values(one, *(keys[:3] if kind == "type" else keys))
-            text = plain if isinstance(plain, str) else json.dumps(plain)
+            text = plain if isinstance(plain, str) else flow(from_plain(plain, Source(Option("set", name))))
             changed = changed.select(sets=(*changed.selection.sets, f"{name}={text}"))
         return changed
 
@@ -151,11 +161,13 @@ class Pipeline:
         changed, plain = self._with_values(patch) if isinstance(patch, Mapping) else (self, Path(patch))
         return changed.select(patches=(*changed.selection.patches, plain))
 
-    def with_scene(self, scene: str | Path | Mapping[str, Any]) -> Pipeline:
+    def with_scene(self, scene: str | Path | Mapping[str, Any] | MeshData) -> Pipeline:
         """Return a copy with another scene: a name, a file, or a `Scene` or other mapping with a scene file's keys."""
+        if isinstance(scene, MeshData):
+            scene = {"scene": 1, "objects": {"mesh": {"file": scene}}}
         if isinstance(scene, Mapping):
             return self.select(scene=None).patch({"scene": None}).patch({"scene": scene})
-        return self.select(scene=str(scene))
+        return self.select(scene=_path("scene", scene, "a `Scene`"))
 
     def with_camera(self, name: str | None = None, **keys: Any) -> Pipeline:
         """Return a copy seen from a camera of the scene, or from a new one: `with_camera(eye=(0, 1, 4), target=…)`.
@@ -169,10 +181,12 @@ class Pipeline:
             return self.set(f"scene.cameras.{name}", keys).select(camera=name)
         return self.select(camera=name)
 
-    def with_environment(self, environment: str | Path | npt.NDArray[Any]) -> Pipeline:
+    def with_environment(self, environment: str | Path | Mapping[str, Any] | npt.NDArray[Any]) -> Pipeline:
         """Return a copy with another environment: a shipped name, a file, or an array (height, width, 3) of light."""
+        if isinstance(environment, Mapping):
+            return self.patch({"scene": {"environment": environment}})
         changed, plain = self._with_values(environment, "environment")
-        return changed.select(environment=Path(plain))
+        return changed.select(environment=Path(_path("environment", plain, "an array")))
 
     def _with_values(self, value: Any, *keys: str) -> tuple[Pipeline, Any]:
         """Return a Python value as plain data, and a copy with the files, types and nodes that it stands for."""

@@ -191,3 +191,24 @@ def test_a_class_of_a_notebook_is_a_node_type_and_its_cell_runs_again(tmp_path: 
     (tmp_path / "notebook.py").write_text(NOTEBOOK)
     done = subprocess.run([sys.executable, "notebook.py"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: rg.load(None), "source: expected a name, a file or a mapping, got None"),  # type: ignore[arg-type]
+        (lambda: rg.load("forward", scene=np.zeros(3)), "scene: expected a name, a file or a `Scene`, got array"),  # type: ignore[arg-type]
+        (lambda: rg.load("forward").with_environment(3), "environment: expected a name, a file or an array, got 3"),  # type: ignore[arg-type]
+        (lambda: rg.load("forward").set("light.type", int), "RG106 <class 'int'> cannot be written to a file"),
+    ],
+)
+def test_what_no_value_can_be_is_refused_at_once(call: Any, message: str) -> None:
+    with pytest.raises(rg.RendergraphError, match=message):
+        call()
+
+
+def test_a_mesh_alone_is_a_scene_and_infinity_a_number() -> None:
+    assert len(rg.load("forward", scene=rg.Mesh(**QUAD)).link().scene.objects) == 1
+    far = rg.load("forward").with_camera(eye=(0, 0, 3), far=float("inf")).link().scene.cameras["custom"].far
+    assert far == float("inf")
+    assert rg.load("forward").with_environment({"file": "sky", "intensity": 2}).link().scene.environment is not None
