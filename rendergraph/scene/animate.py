@@ -15,9 +15,9 @@ from rendergraph.errors import InputError, Option, Place, Problem, suggestion
 from rendergraph.facts import NO_EXTRA, Extra
 from rendergraph.scene import scene_values
 from rendergraph.scene.cameras import WIDE, bounding_sphere, framing_camera
+from rendergraph.scene.environments import grounded, lit
 from rendergraph.scene.geometry import rigid, translation, vec3
 from rendergraph.scene.model import Matrix, Orbit, Placement, Scene, Vec3
-from rendergraph.scene.surroundings import grounded, lit
 
 if TYPE_CHECKING:
     from rendergraph.scene.rig import Pose

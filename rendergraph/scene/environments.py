@@ -1,4 +1,4 @@
-"""The shipped environments, which lie beside the shipped scenes: they are content, like nodes."""
+"""The shipped environments and surroundings, which lie beside the shipped scenes: they are content, like nodes."""
 
 from __future__ import annotations
 
@@ -6,3 +6,5 @@ from rendergraph.pipelines.environments import SHIPPED as SHIPPED
 from rendergraph.pipelines.environments import SKIES as SKIES
 from rendergraph.pipelines.environments import named as named
 from rendergraph.pipelines.environments import shipped as shipped
+from rendergraph.pipelines.environments.surroundings import grounded as grounded
+from rendergraph.pipelines.environments.surroundings import lit as lit

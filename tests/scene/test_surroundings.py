@@ -7,19 +7,19 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 from rendergraph.nodes.shadows._light_views import receiving_box
-
-from rendergraph.errors import InputError
-from rendergraph.scene import animate
-from rendergraph.scene.facts import FrameScene
-from rendergraph.scene.load import load
-from rendergraph.scene.model import Scene
-from rendergraph.scene.surroundings import (
+from rendergraph.pipelines.environments.surroundings import (
     GROUND_EXTENT,
     GROUND_HEIGHT,
     KEY_LUX,
     STUDIO_FILL,
     typical_illuminance,
 )
+
+from rendergraph.errors import InputError
+from rendergraph.scene import animate
+from rendergraph.scene.facts import FrameScene
+from rendergraph.scene.load import load
+from rendergraph.scene.model import Scene
 
 FLOOR = "scene: 1\nobjects: {floor: {shape: plane, size: [2, 2]}}\nlights: {sun: {%s}}\n"
 

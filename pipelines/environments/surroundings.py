@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 from msgspec.structs import replace
+from rendergraph.pipelines.environments import shipped
 
 from rendergraph.errors import Place, Problem
 from rendergraph.projection import unit
 from rendergraph.scene.cameras import lowest_point
-from rendergraph.scene.environments import shipped
 from rendergraph.scene.geometry import vec3
 from rendergraph.scene.model import Camera, Light, Material, Mesh, Object, Scene
 
