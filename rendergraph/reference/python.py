@@ -10,8 +10,7 @@ from typing import Any
 
 import msgspec
 
-import rendergraph
-import rendergraph.api
+from rendergraph import api
 from rendergraph.catalog.types import shared_includes
 
 PUBLIC_ERRORS = ("InputError", "RenderError", "DeviceError", "UsageError", "Problem", "Place")
@@ -21,21 +20,22 @@ _FUNCTION = re.compile(r"^((?:\w+ )?\w+) (\w+)\(([^;{}()]*)\)(?: \{|;)", re.MULT
 
 def public_names() -> dict[str, Any]:
     """Return everything public in Python by name: of `rendergraph`, `rendergraph.errors` and `rendergraph.api`."""
-    own = {name: _value(name) for name in rendergraph.__all__}
-    errors = import_module("rendergraph.errors")
+    # By its name: the package offers the viewer, too, which this explains and does not need.
+    package, errors = import_module("rendergraph"), import_module("rendergraph.errors")
+    own = {name: _value(package, name) for name in package.__all__}
     return own | {name: getattr(errors, name) for name in PUBLIC_ERRORS} | author_names()
 
 
 def author_names() -> dict[str, Any]:
     """Return what authors of nodes import from `rendergraph.api`, and what `update` is given."""
-    api = {name: value for name, value in sorted(vars(rendergraph.api).items()) if name[0] != "_"}
-    found = {name: value for name, value in api.items() if not inspect.ismodule(value)}
+    named = {name: value for name, value in sorted(vars(api).items()) if name[0] != "_"}
+    found = {name: value for name, value in named.items() if not inspect.ismodule(value)}
     given = {"FrameScene": "rendergraph.steps.frame", "Light": "rendergraph.scene.model"}
     return found | {name: getattr(import_module(module), name) for name, module in given.items()}
 
 
-def _value(name: str) -> Any:
-    found = getattr(rendergraph, name)
+def _value(package: Any, name: str) -> Any:
+    found = getattr(package, name)
     return getattr(found, name) if inspect.ismodule(found) else found
 
 
@@ -93,9 +93,7 @@ def public_members(cls: type) -> Iterator[tuple[str, Any]]:
     """Documented methods and properties that the class defines, or a base that has no entry of its own."""
     seen: set[str] = set()
     for base in cls.__mro__:
-        if not base.__module__.startswith("rendergraph") or (
-            base is not cls and hasattr(rendergraph.api, base.__name__)
-        ):
+        if not base.__module__.startswith("rendergraph") or (base is not cls and hasattr(api, base.__name__)):
             continue
         for name, value in vars(base).items():
             shown = member_of(value)
