@@ -205,6 +205,7 @@ def image(gl: rg.Session, name: str, plugin: Path, **settings: str) -> Any:
     return gl.render(pipeline)["image"].astype(int)
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("shading", ["toon", "combed"])
 def test_every_lighting_node_takes_a_plugins_model(gl: rg.Session, sketch: Path, shading: str) -> None:

@@ -135,6 +135,7 @@ def test_an_extension_that_ends_is_a_mistake(cli: Any, plugin: Path, what: str, 
     assert code in found.err
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize(
     ("body", "code", "said"),
     [

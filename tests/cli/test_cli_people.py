@@ -35,6 +35,7 @@ def test_environments_are_listed_with_a_line_each(cli: Any) -> None:
     assert all(one["name"] in shown and one["line"] in shown for one in told)
 
 
+@pytest.mark.nightly(keep=12)
 @pytest.mark.parametrize("name", [*shipped_pipelines(), *shipped_scenes()])
 def test_what_comes_along_is_explained(cli: Any, name: str) -> None:
     result = cli("explain", name)

@@ -43,6 +43,7 @@ def test_nodes_lists_every_type(cli: Any) -> None:
         assert entry["doc"].partition("\n")[0] in listed.out
 
 
+@pytest.mark.nightly(keep=16)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CATALOG.names())
 def test_every_node_can_be_explained(cli: Any, name: str) -> None:
@@ -57,6 +58,7 @@ def test_every_node_can_be_explained(cli: Any, name: str) -> None:
     assert f"type: {name}" in whole
 
 
+@pytest.mark.nightly(keep=60)
 @pytest.mark.slow
 @pytest.mark.parametrize("code", CODES)
 def test_every_code_can_be_explained(cli: Any, code: str) -> None:

@@ -386,6 +386,7 @@ def test_what_was_lost_with_all_workers_is_sent_to_the_next(
     same(here, tmp_path / "here", there, tmp_path / "there")
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("error", [OSError("closed"), KeyError("tcp://10.0.0.1:1"), ValueError("no replicas")])
 def test_what_a_worker_does_not_get_as_it_goes_is_sent_to_others(
     monkeypatch: pytest.MonkeyPatch, error: Exception

@@ -223,6 +223,7 @@ def replace_objects(scene: Scene, keep: Callable[[Object], bool]) -> Scene:
     return replace(scene, objects=tuple(placed for placed in scene.objects if keep(placed)))
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("scene", ["shadow_study", "courtyard", "cornell_box", "still_life"])
 def test_rays_of_the_camera_find_what_is_drawn(gl: rg.Session, tmp_path: Path, scene: str) -> None:
     """The same object everywhere, and the same triangle at 99.9 % of the pixels away from edges."""

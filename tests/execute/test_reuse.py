@@ -156,7 +156,7 @@ def test_random_graphs_under_edits(
 
 
 @pytest.mark.slow
-@pytest.mark.nightly(keep=4)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize(
     ("name", "values"),
     [

@@ -68,6 +68,7 @@ def test_nothing_is_left_of_it(gl: rg.Session) -> None:
         assert gl.device.raw.error() is None
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize(
     "name",
     [

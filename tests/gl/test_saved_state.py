@@ -399,7 +399,7 @@ FORWARD = rg.load("forward", size=(40, 24))
 
 
 @pytest.mark.slow
-@pytest.mark.nightly(keep=3)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("seed", range(8))
 def test_the_owners_state_changes_no_picture_and_is_found_again(
     seed: int, gl: rg.Session, borrowed: tuple[rg.Session, Owner], pictures: dict[str, rg.Pipeline]

@@ -79,6 +79,7 @@ def expected(picture: Floats, threshold: float, intensity: float, radius: int, l
     return total * intensity / levels
 
 
+@pytest.mark.nightly(keep=4)
 @pytest.mark.parametrize("size", [(64, 48), (61, 37), (7, 3)], ids=lambda s: f"{s[0]}x{s[1]}")
 @pytest.mark.parametrize(("radius", "levels"), [(6, 1), (3, 2), (6, 3)])
 def test_formula(draw: Draw, noise: Noise, size: tuple[int, int], radius: int, levels: int) -> None:

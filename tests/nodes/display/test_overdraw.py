@@ -31,6 +31,7 @@ def test_each_layer_counts_once_unless_hidden(session: rg.Session, tmp_path: Pat
     assert frame.figures == {"mean": pytest.approx(right.mean()), "maximum": right.max()}
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("size", [(1, 1), (7, 5), (33, 19), (64, 48)])
 def test_figures_are_of_the_whole_picture(session: rg.Session, size: tuple[int, int]) -> None:
     frame = session.render(rg.load("overdraw", scene="shadow_study", size=size), taps=["overdraw.count"])

@@ -161,6 +161,7 @@ def test_a_brighter_scene_looks_the_same_under_automatic_exposure(draw: Callable
     np.testing.assert_allclose(more, once, atol=1e-5)
 
 
+@pytest.mark.nightly(keep=4)
 @pytest.mark.parametrize("curve", CURVES)
 def test_more_light_is_never_darker_and_never_past_white(draw: Callable[..., rg.Frame], curve: str) -> None:
     ramp = np.concatenate([[0], np.geomspace(1e-4, 1e9, 255)]).reshape(1, 256, 1)

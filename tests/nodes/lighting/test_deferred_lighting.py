@@ -67,6 +67,7 @@ def test_full_precision_draws_the_forward_picture(radiance: Any, steps_off: Any,
     same(steps_off(radiance("deferred", scene, FULL), radiance("forward-prepass", scene)))
 
 
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize("scene", SCENES)
 def test_the_picture_is_that_of_forward(session: rg.Session, scene: str) -> None:
     """Compact, as it comes, against shadows looked up in place: a pixel in a thousand, along shadows and grazing faces."""
@@ -177,6 +178,7 @@ def test_background_and_coverage(radiance: Any) -> None:
 # --- compact: a stated bound -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly(keep=3)
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_compact_is_off_by_half_a_step_of_ten_bits_of_the_root_of_base_colour(session: rg.Session, scene: str) -> None:

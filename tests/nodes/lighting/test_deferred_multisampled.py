@@ -42,7 +42,7 @@ def test_the_picture_is_that_of_every_sample_lit(session: rg.Session, scene: str
     np.testing.assert_allclose(marked["edge_share"], edges.mean(), rtol=1e-6)
 
 
-@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("scene", "taps", "size"),
     [

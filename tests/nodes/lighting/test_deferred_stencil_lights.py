@@ -51,7 +51,7 @@ LIGHTS = {
 }
 
 
-@pytest.mark.nightly(keep=4)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("name", LIGHTS)
 def test_it_draws_the_deferred_picture(radiance: Any, steps_off: Any, tmp_path: Path, name: str) -> None:
     scene = room(tmp_path, LIGHTS[name])

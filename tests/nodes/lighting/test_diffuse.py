@@ -28,7 +28,7 @@ def within_a_step(a: Floats, b: Floats) -> bool:
     return bool((np.abs(a - b) <= 2.0**-9 * np.maximum(np.abs(a), np.abs(b)) + 2.0**-20).all())
 
 
-@pytest.mark.nightly(keep=3)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "pipeline", "sets"), [("spheres", "deferred", ()), *(("glass", *variant) for variant in VARIANTS)]

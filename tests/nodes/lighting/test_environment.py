@@ -168,7 +168,7 @@ def test_it_goes_under_the_term_ambient(session: rg.Session, plugins: list[Path]
     np.testing.assert_allclose(terms[0][..., :3], sum(term[..., :3] for term in terms[1:]), rtol=1e-3)
 
 
-@pytest.mark.nightly(keep=4)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("name", PIPELINES[1:])
 @pytest.mark.parametrize("model", ["pbr", "anisotropic", "phong", "unlit"])
 def test_all_ways_of_drawing_agree(session: rg.Session, plugins: list[Path], name: str, model: str) -> None:

@@ -83,6 +83,7 @@ def test_harmonics_are_the_integrals(session: rg.Session, references: Path, tmp_
     assert (np.abs(bands - table["sh"]) / mean).max() < 0.01
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("name", NAMES)
 def test_irradiance_is_that_of_nine_harmonics(asked: Asked, references: Path, name: str) -> None:
     table, mean = oracles(references, name)
@@ -117,6 +118,7 @@ def test_the_window_keeps_light_from_ringing(session: rg.Session, asked: Asked, 
     np.testing.assert_array_equal(even[0], even[1])
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("name", NAMES)
 def test_prefiltered_light_is_the_integral(asked: Asked, references: Path, name: str) -> None:
     """Within 2 % from roughness 0.3 on, at levels and between them, also around a sun of one texel."""

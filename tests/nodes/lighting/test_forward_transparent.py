@@ -127,7 +127,7 @@ materials:""",
     assert (picture[..., 0] < 0.7 * 0.03 * 0.72).mean() > 0.01, "there are corners"
 
 
-@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("shading", ["unlit", "phong", "blinn_phong", "anisotropic", "pbr"])
 def test_every_shading_model_draws_the_forward_picture(radiance: Any, steps_off: Any, shading: str) -> None:

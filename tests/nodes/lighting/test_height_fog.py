@@ -112,6 +112,7 @@ def distances(session: rg.Session) -> tuple[Floats, Floats]:
     return rays / lengths[..., None], np.where(depth > 0, along * lengths, 1e5)
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize(
     ("density", "falloff", "height"), [(0.08, 0.35, 0.0), (0.02, 0.0, 0.0), (0.02, 0.05, 0.0), (0.3, 2.0, 1.0)]
 )

@@ -51,7 +51,7 @@ def drawn(session: rg.Session, pipeline: str, *taps: str) -> list[Floats]:
     return [np.asarray(frame[tap], np.float64)[..., :3] for tap in taps]
 
 
-@pytest.mark.nightly(keep=4)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize(("pipeline", "sets"), VARIANTS)
 def test_the_sum_of_the_parts_is_the_radiance(session: rg.Session, pipeline: str, sets: tuple[str, ...]) -> None:
     """Of opaque surfaces: the reflections of the environment in glass have no output."""

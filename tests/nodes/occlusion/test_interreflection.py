@@ -202,6 +202,7 @@ def test_a_plane_sends_itself_nothing(draw: Draw, technique: str) -> None:
     assert draw(technique, scene, {"x": "gi.indirect"})["x"].max() == 0
 
 
+@pytest.mark.nightly(keep=4)
 @pytest.mark.parametrize("technique", ["ssao-ssgi", "ssil"])
 @pytest.mark.parametrize("height", [0.05, 1, 20])
 @pytest.mark.parametrize("lens", ["fov_y_degrees: 60", "height: 3"])
@@ -214,6 +215,7 @@ cameras: {{main: {{eye: [0, {height}, 2], target: [0.3, 0, -1], {lens}, near: 0.
     assert draw(technique, scene, {"x": "gi.occlusion"}, *sets, size=(64, 48))["x"][..., 0].min() > 1 - 1e-3
 
 
+@pytest.mark.nightly(keep=3)
 @ALL
 @pytest.mark.parametrize("by", [0.01, 250])
 def test_light_in_other_units_is_the_same(draw: Draw, technique: str, by: float) -> None:

@@ -185,6 +185,7 @@ def test_the_blur_is_a_mean_over_the_same_surface(show: Show, size: tuple[int, i
     np.testing.assert_allclose(found, expected, atol=2e-3)
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.slow
 @pytest.mark.parametrize(("size", "scale"), [((64, 48), 0.5), ((81, 61), 0.25), ((64, 48), 0.125)])
 def test_upsampling_keeps_to_the_surface(show: Show, size: tuple[int, int], scale: float) -> None:

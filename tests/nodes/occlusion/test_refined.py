@@ -53,6 +53,7 @@ def test_edges_and_contacts_are_those_of_the_whole_size(apart: Occlusion, techni
     assert mean < 0.4 * np.sqrt((apart(technique, contrast=1) ** 2).mean())
 
 
+@pytest.mark.nightly(keep=4)
 @TECHNIQUES
 @pytest.mark.parametrize("axis", [0, 1])
 def test_what_is_interpolated_is_smooth(occlusion: Occlusion, technique: str, axis: int) -> None:

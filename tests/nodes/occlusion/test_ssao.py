@@ -46,6 +46,7 @@ def test_hemispheres_find_the_ray_traced_occlusion(
     assert rmse < 0.08
 
 
+@pytest.mark.nightly(keep=6)
 @pytest.mark.parametrize(("technique", "least"), [("disc", 0.88), ("hbao", 0.93), ("gtao", 0.93)])
 @pytest.mark.parametrize(("case", "radius"), CASES)
 def test_arms_find_the_ray_traced_occlusion(
@@ -104,7 +105,7 @@ cameras: {{main: {{eye: [0, {height}, 2], target: [0.3, 0, -1], {lens}, near: 0.
 """
 
 
-@pytest.mark.nightly(keep=18)
+@pytest.mark.nightly(keep=9)
 @ALL
 @pytest.mark.parametrize("scale", [1, 0.5, 0.125])
 @pytest.mark.parametrize("height", [0.05, 1, 20])

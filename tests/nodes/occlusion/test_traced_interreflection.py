@@ -130,7 +130,7 @@ def test_surfaces_send_on_what_they_see_of_the_sky(session: rg.Session, tmp_path
     assert found[..., 0].mean() == pytest.approx(expected.mean(), rel=0.02)
 
 
-@pytest.mark.parametrize(("bounces", "part"), [(1, "one_bounce"), pytest.param(10, "full", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("bounces", "part"), [(1, "one_bounce"), pytest.param(10, "full", marks=pytest.mark.nightly)])
 def test_light_in_a_box_is_the_path_traced_one(session: rg.Session, shared: Path, bounces: int, part: str) -> None:
     from OpenImageIO import FLOAT, ImageBuf
 

@@ -302,6 +302,7 @@ def test_a_shared_diffuse_lobe_reflects_what_the_specular_lobe_leaves(
     assert found["metal"] == pytest.approx(albedos(degrees)["metal"], rel=0.01)
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(("model", "highlight"), [("phong", phong_highlight), ("blinn_phong", blinn_highlight)])
 def test_empirical_models_reflect_no_more_than_they_say(
     session: rg.Session, tmp_path: Path, model: str, highlight: Any
@@ -355,6 +356,7 @@ def test_an_emissive_surface_lights_by_its_form_factor(
     assert image.mean(axis=(0, 1)) == pytest.approx(0.5 * factor * np.array([2, 4, 6]), rel=allowed)
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(("mode", "part"), [("blend", 0.25), ("mask", 0)])
 def test_a_lamp_emits_as_much_light_as_it_is_opaque(
     session: rg.Session, tmp_path: Path, mode: str, part: float
@@ -482,18 +484,18 @@ def test_frames_add_samples_until_something_changes(session: rg.Session, tmp_pat
 # Parts ---------------------------------------------------------------------------------------------------------------
 
 
-def test_parts_and_sources_add_up(session: rg.Session) -> None:
+@pytest.mark.nightly(keep=1)
+@pytest.mark.parametrize(
+    ("parameter", "values"),
+    [("light_part", ("direct", "indirect")), ("sources", ("lights", "environment", "emissive"))],
+)
+def test_parts_and_sources_add_up(session: rg.Session, parameter: str, values: tuple[str, ...]) -> None:
     """In the courtyard with its sun, sky and lanterns, by means of the whole picture."""
     shared = {"samples": 16, "seed": 3}
     whole = light(session, "courtyard", shared).mean(axis=(0, 1))
-    parts = [
-        light(session, "courtyard", {**shared, "light_part": part}).mean(axis=(0, 1)) for part in ("direct", "indirect")
-    ]
+    parts = [light(session, "courtyard", {**shared, parameter: value}).mean(axis=(0, 1)) for value in values]
     assert sum(parts) == pytest.approx(whole, rel=0.02)
-    names = ("lights", "environment", "emissive")
-    sources = [light(session, "courtyard", {**shared, "sources": name}).mean(axis=(0, 1)) for name in names]
-    assert sum(sources) == pytest.approx(whole, rel=0.02)
-    assert min(source.min() for source in sources) > 0.005
+    assert min(part.min() for part in parts) > 0.005
 
 
 def test_direct_light_of_a_lamp_is_that_of_a_shadow_volume(session: rg.Session) -> None:

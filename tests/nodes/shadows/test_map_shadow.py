@@ -143,6 +143,7 @@ LIGHTS = {
 }
 
 
+@pytest.mark.nightly(keep=4)
 @pytest.mark.parametrize("taps", [1, 8, 16])
 @pytest.mark.parametrize("kind", list(LIGHTS))
 def test_flat_faces_are_wholly_lit(session: rg.Session, tmp_path: Path, kind: str, taps: int) -> None:

@@ -125,7 +125,7 @@ def test_what_faces_the_light_has_no_acne(session: rg.Session, tmp_path: Path, k
 # --- both forms ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.nightly(keep=3)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("scene", ["cornell_box", "shadow_study"])
 @pytest.mark.parametrize("kind", list(WIDE))
 def test_both_forms_give_the_same_picture(session: rg.Session, kind: str, scene: str) -> None:

@@ -33,7 +33,7 @@ def test_given_values(glsl_function: Callable[..., float], shared: Path) -> None
         assert found == pytest.approx(case["value"], abs=2e-5)
 
 
-@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "radius", "terms"),

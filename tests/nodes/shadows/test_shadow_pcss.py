@@ -67,7 +67,7 @@ def truth(points: Floats, kind: str, width: float, count: int = 256) -> Floats:
     return seen / count
 
 
-@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("kind", "width"), [("spot", 0.5), ("spot", 0.2), ("point", 0.4), ("directional", 0.15), ("directional", 0.05)]
 )

@@ -131,6 +131,7 @@ def wrong(session: rg.Session, tmp_path: Path, lit: dict[tuple[bytes, str], Mask
     return measure
 
 
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize("silhouettes", ["gpu", "cpu"])
 @pytest.mark.parametrize("method", ["zpass", "zfail", "auto"])
 def test_volumes_are_where_rays_are_stopped(wrong: Any, method: str, silhouettes: str) -> None:
@@ -138,6 +139,7 @@ def test_volumes_are_where_rays_are_stopped(wrong: Any, method: str, silhouettes
     assert wrong(f"shadows.method={method}", f"shadows.silhouettes={silhouettes}") == [0, 0, 0]
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("silhouettes", ["gpu", "cpu"])
 @pytest.mark.parametrize("eye", [EYE, "eye: [-1.6, 4, 1.2], target: [0, 0, 0], "], ids=["askew", "along the sun"])
@@ -148,6 +150,7 @@ def test_parallel_views(wrong: Any, silhouettes: str, eye: str) -> None:
     assert wrong(*sets, camera=camera, dark=0.02 if eye == EYE else 0) == [0, 0, 0]
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("silhouettes", ["gpu", "cpu"])
 def test_ends_at_infinity_pass_the_far_plane(wrong: Any, silhouettes: str) -> None:
@@ -211,6 +214,7 @@ def test_modes_change_no_bit(session: rg.Session, tmp_path: Path) -> None:
             assert np.array_equal(session.render(loaded, **mode)["image"], plain)
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("pipeline", ["deferred", "forward-prepass", "deferred-stencil-lights"])
 def test_a_variant_of_every_pipeline_that_has_depth_first(session: rg.Session, pipeline: str) -> None:
@@ -253,6 +257,7 @@ def test_without_casters_or_lights_all_is_lit(session: rg.Session, tmp_path: Pat
 CASES = ("dir_basic", "dir_camera_in_shadow", "dir_cascades", "point_room", "spot_basic")
 
 
+@pytest.mark.nightly(keep=10)
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize(
