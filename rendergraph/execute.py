@@ -51,6 +51,7 @@ _Part: TypeAlias = Annotated[float, Range(-1, 1)]
 _Offset: TypeAlias = Annotated[tuple[_Part, _Part], "x and y in texels, from -1 to 1"]
 
 
+_MOMENT_STRIDE = 100_003
 _CHANGES = {"camera": "", "parameters": "", "size": "", **SCENE_CHANGES}
 
 
@@ -272,7 +273,8 @@ class Runner(Struct, eq=False):
         if executable.reads_frame:
             if not moment:
                 self._count_still(moved_from, time)
-            if views.set_frame(time, delta, index, self._still):
+            number = index + _MOMENT_STRIDE * (moments - 1 - moment)  # other noise in each; the last has the frame's
+            if views.set_frame(time, delta, number, self._still):
                 executable.touched.add("frame_block")
         if not self._complete:
             self._check_views()

@@ -162,7 +162,7 @@ class RenderOptions(Struct, frozen=True):
         cull: skip objects outside the view that they would be rendered with. No bit of a picture depends on it.
         still: a frame after which the scene, the camera and the time stay as they are, so that pictures accumulate.
         subframes: number of moments while the camera's shutter is open, centred on the frame's, of whose light a frame
-            is the mean. Histories advance once a frame.
+            is the mean. Histories advance once a frame; what is random differs from moment to moment.
         turntable: the frames in which the camera goes around its target once.
     """
 

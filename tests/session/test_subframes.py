@@ -32,6 +32,16 @@ uniform sampler2D depth;
 out vec4 color;
 void main() { color = vec4(vec3(linear_depth(camera, texelFetch(depth, ivec2(gl_FragCoord.xy), 0).r) < 7.0), 1.0); }
 """
+NOISE = """/*---
+doc: A number for each frame.
+inputs: {depth: {semantic: depth, doc: Is not looked at for its value.}}
+outputs: {color: {semantic: radiance, format: rgba32f, doc: Grey.}}
+---*/
+#include <frame.glsl>
+uniform sampler2D depth;
+out vec4 color;
+void main() { color = vec4(float(frame_index * 37 & 63) / 64.0 + 0.0 * texelFetch(depth, ivec2(0), 0).r); }
+"""
 COLORS = """rendergraph: 1
 nodes:
   prepass: {type: depth_prepass}
@@ -100,6 +110,18 @@ def test_a_point_that_does_not_move_has_the_same_light(gl: rg.Session, scene: Pa
     one, many = (gl.render(pipeline, frames=range(4, 5), subframes=n)["radiance"] for n in (1, 7))
     np.testing.assert_array_equal(many[:, 50:], one[:, 50:])
     assert (many != one).any()
+
+
+def test_noise_differs_from_moment_to_moment(gl: rg.Session, scene: Path) -> None:
+    """Each moment has a number of its own for what is random; the last one has the frame's."""
+    (scene.parent / "noise.frag").write_text(NOISE)
+    (scene.parent / "noise.yaml").write_text(
+        COLORS.replace("./shown.frag", "./noise.frag").replace("image", "radiance")
+    )
+    pipeline = rg.load(scene.parent / "noise.yaml", scene=scene, size=SIZE)
+    found = [gl.render(pipeline, frames=range(4, 5), subframes=n)["radiance"][0, 0, 0] for n in (1, 4)]
+    moments = 4 + 100_003 * np.arange(4)
+    np.testing.assert_allclose(found, [(4 * 37 & 63) / 64, (moments * 37 & 63).mean() / 64])
 
 
 def test_histories_advance_once_a_frame(gl: rg.Session, scene: Path) -> None:
