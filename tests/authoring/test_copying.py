@@ -38,6 +38,7 @@ def test_copies_of_pipelines_and_scenes_are_resolved_as_the_shipped_ones(here: P
     assert len(scene.objects) == len(rg.load("forward", scene="salamander").link().scene.objects)
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("node", "type", "pipeline"),
     [("display", "tonemap", "forward"), ("ao", "hbao", "ssao-hbao"), ("shadows", "shadow_vsm", "shadow-vsm")],
@@ -60,6 +61,7 @@ def test_every_shipped_node_can_be_copied() -> None:
     assert (len(types), mistakes) == (len(names), [])
 
 
+@pytest.mark.nightly(keep=12)
 @pytest.mark.parametrize(
     "name", sorted({f"pipeline:{n}" for n in shipped_pipelines()} | {f"scene:{n}" for n in shipped_scenes()})
 )
