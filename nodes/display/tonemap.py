@@ -73,7 +73,9 @@ class Tonemap(Node):
         optional=True,
         doc="Factor in addition to `exposure`, such as that of automatic exposure.",
     )
-    color = Output(DisplayColor, format="rgba8", doc="Display-referred colour, sRGB encoded; alpha is 1.")
+    color = Output(
+        DisplayColor, format="rgba8", doc="Display-referred colour, sRGB encoded; alpha is 1, unless `transparent`."
+    )
     curve_table = Internal(
         Any, kind="texture3d", format="rgba16", size=(ACES2_SIDE, ACES2_SIDE), layers=ACES2_SIDE, kept=True
     )

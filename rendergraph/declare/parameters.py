@@ -26,6 +26,9 @@ class FileContent(Struct, frozen=True):
     path: Path
     digest: str
 
+    def __str__(self) -> str:
+        return str(self.path)
+
 
 InputFile: TypeAlias = Annotated[
     FileContent, "a file's name", Brief("path"), JsonSchema(lambda: {"type": "string", "minLength": 1})

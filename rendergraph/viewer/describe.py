@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence, Set
 from typing import Any
 
-from rendergraph.declare import Input, Parameter
+from rendergraph.declare import FileContent, Input, Parameter
 from rendergraph.diagrams import graph_json, plan_json
 from rendergraph.errors import InputError
 from rendergraph.link import Graph, GraphNode
 from rendergraph.scene.animate import moves
 from rendergraph.session.values import Linked, Planned
+from rendergraph.typecheck import accepts
 
 
 def describe(planned: Planned) -> dict[str, Any]:
@@ -91,12 +92,14 @@ def _parameter(parameter: Parameter, value: Any, added: tuple[str, ...]) -> dict
         "min": parameter.limits.low,
         "max": parameter.limits.high,
         "choices": choices,
-        "kind": "choice" if choices else "color" if parameter.glsl == "vec3" else _kind(value),
+        "kind": "choice" if choices else "color" if parameter.glsl == "vec3" else _kind(value, parameter.type),
         "takes": parameter.takes(added),
     }
 
 
-def _kind(value: Any) -> str:
+def _kind(value: Any, annotation: Any = None) -> str:
+    if accepts(annotation, FileContent):
+        return "text"
     kinds: tuple[tuple[type, str], ...] = ((bool, "boolean"), (int, "integer"), (float, "number"), (str, "text"))
     return next((name for kind, name in kinds if isinstance(value, kind)), "json")
 

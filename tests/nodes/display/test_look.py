@@ -208,3 +208,9 @@ def test_what_opencolorio_refuses(tmp_path: Path, name: str, text: str, sets: tu
     with pytest.raises(InputError) as error:
         rg.load("forward", sets=[f"display.look={tmp_path / name}", *(f"display.{one}" for one in sets)]).link()
     assert message in str(error.value)
+
+
+def test_a_look_is_shown_by_its_path(tmp_path: Path) -> None:
+    (tmp_path / "same.cube").write_text(cube_text(grid(2)))
+    linked = rg.load("forward", sets=[f"display.look={tmp_path / 'same.cube'}"]).link()
+    assert str(linked.graph["display"].node.look) == str(tmp_path / "same.cube")  # type: ignore[attr-defined]
