@@ -54,7 +54,7 @@ def complete(
     if camera_name is not None and "=" in camera_name:
         from rendergraph.scene.camera_words import described_camera  # few cameras are
 
-        cameras = {"camera": described_camera(camera_name, next(iter(cameras.values()))), **cameras}
+        cameras = {"--camera": described_camera(camera_name, next(iter(cameras.values()))), **cameras}
     elif camera_name is not None:
         if camera_name not in cameras:
             text = f"the scene has no camera '{camera_name}'{suggestion(camera_name, cameras)}"

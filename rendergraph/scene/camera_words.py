@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from typing import Any
 
 from rendergraph.document import parse
 from rendergraph.errors import InputError, Option, Place, Problem
@@ -14,32 +15,42 @@ from rendergraph.scene.geometry import vec3
 from rendergraph.scene.model import Camera
 
 
-def described_camera(text: str, other: Camera) -> Camera:
-    """Return the camera of a text, `eye=0,1,5 target=0,1,0 fov=40`; what it does not say is that of another.
+def keys_of(text: str) -> dict[str, Any]:
+    """Return the keys of a scene file's cameras that a text has, such as `eye=0,1,5 target=0,1,0 fov=40`.
 
-    The keys are those of a scene file's cameras, and `fov` for `fov_y_degrees`.
+    `fov` stands for `fov_y_degrees`.
     """
     words = [word.partition("=")[::2] for word in text.split()]
     keys = [(re.sub(r"^fov$", "fov_y_degrees", name), f"[{v}]" if "," in v else v) for name, v in words]
-    here = Place(Option("--camera", text))
     validator = Validator(scene_keys.CODES)
     try:
         root = parse("".join(f"{json.dumps(name)}: {value}\n" for name, value in keys), "--camera").root
         valid = validator.value(root, Key("camera", scene_keys.CAMERA, ""))
         if validator.problems or valid is None:
             raise InputError(validator.problems)
-        values = plain(valid, scene_keys.CAMERA)
-        x, y, z = other.transform[:3, 3]
-        given = {
-            "eye": (x, y, z),
-            "target": other.target or vec3(other.transform[:3, 3] - other.transform[:3, 2]),
-            "near": other.near,
-            "far": other.far,
-            "shutter": other.shutter,
-        }
-        if values.keys().isdisjoint(("fov_y_degrees", "height", "frustum")):
-            kind = {"perspective": "fov_y_degrees", "orthographic": "height", "frustum": "frustum"}[other.type]
-            given[kind] = {"fov_y_degrees": math.degrees(other.fov_y), "height": other.height}.get(kind, other.frustum)
+    except InputError as error:
+        here = Place(Option("--camera", text))
+        raise InputError([problem.relocate(here) for problem in error.problems]) from None
+    found: dict[str, Any] = plain(valid, scene_keys.CAMERA)
+    return found
+
+
+def described_camera(text: str, other: Camera) -> Camera:
+    """Return the camera of a text; what it does not say is that of another."""
+    values = keys_of(text)
+    x, y, z = other.transform[:3, 3]
+    given = {
+        "eye": (x, y, z),
+        "target": other.target or vec3(other.transform[:3, 3] - other.transform[:3, 2]),
+        "near": other.near,
+        "far": other.far,
+        "shutter": other.shutter,
+    }
+    if values.keys().isdisjoint(("fov_y_degrees", "height", "frustum")):
+        kind = {"perspective": "fov_y_degrees", "orthographic": "height", "frustum": "frustum"}[other.type]
+        given[kind] = {"fov_y_degrees": math.degrees(other.fov_y), "height": other.height}.get(kind, other.frustum)
+    here = Place(Option("--camera", text))
+    try:
         return scene_values.camera("camera", given | values)
     except InputError as error:
         raise InputError([problem.relocate(here) for problem in error.problems]) from None

@@ -54,7 +54,7 @@ def describe(planned: Planned) -> dict[str, Any]:
         "parameters": parameters,
         "disabled": list(graph.disabled),
         "plan": plan_json(planned.plan),
-        "cameras": list(linked.scene.cameras),
+        "cameras": [name for name in linked.scene.cameras if not name.startswith("--")],  # without one in words
         "outputs": list(graph.outputs),
         "moves": moves(linked.scene),
         "warnings": [problem.as_json() for problem in linked.warnings],

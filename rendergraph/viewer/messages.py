@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated, Any, Union
 
 from msgspec import UNSET, Meta, Struct, UnsetType, ValidationError, convert, json
@@ -53,7 +54,14 @@ class CompareRequest:
 
 @dataclass(frozen=True)
 class VariantRequest:
+    """A file that extends the opened pipeline by all edits, and shows the scene by the camera that was moved.
+
+    It will be written into `folder`. A state that does not link is answered with its problems.
+    """
+
     opened: Selection
+    selection: Selection
+    folder: Path
 
 
 @dataclass(frozen=True)

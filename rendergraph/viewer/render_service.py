@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import singledispatchmethod
@@ -17,8 +18,11 @@ from rendergraph import images, stamps
 from rendergraph.compile import Executable
 from rendergraph.document import Source, from_plain
 from rendergraph.errors import Place, Problem, RendergraphError, shown_file
+from rendergraph.formatting import jsonable
 from rendergraph.metrics import measure
 from rendergraph.resolve import diff, to_yaml
+from rendergraph.resources import shipped_scenes
+from rendergraph.scene.camera_words import keys_of
 from rendergraph.scene.cameras import bounding_sphere
 from rendergraph.session import stages
 from rendergraph.session.drawing import Drawing
@@ -81,6 +85,7 @@ class RenderService:
         self._expanded: dict[tuple[Selection, str], Expanded] = {}
         self._planned: Planned | None = None
         self._revision = 0
+        self._described: dict[str, Any] = {}
         self._node_of_file: Mapping[str, str] = {}
         self._full_ms = 0.0  # the time of a whole frame, from the last time that each node ran
         self._timed: Executable | None = None
@@ -128,8 +133,7 @@ class RenderService:
         if request.still:
             facts["texture"] = texture_statistics(rendered.pixels, rendered.info)
         if request.known_revision != self._revision:
-            assert self._planned is not None  # the picture is of it
-            facts["pipeline"] = describe(self._planned)
+            facts["pipeline"] = self._described
         facts["revision"] = self._revision
         return Response(
             facts,
@@ -139,17 +143,23 @@ class RenderService:
         )
 
     def _passes(self, rendered: _Rendered) -> list[dict[str, Any]]:
-        """Return each node's last times, and whether it ran for this picture."""
-        if self._timed is not rendered.drawing.executable:
-            self._timed, self._pass_times = rendered.drawing.executable, {}
+        """Return each node's last times, whether it ran for this picture, and whether that was its first time.
+
+        The first time of a program contains what the driver does late. Smaller pictures leave no times behind.
+        """
+        assert self._planned is not None  # the picture is of it
+        is_first = self._timed is not rendered.drawing.executable
         ran = {step.node for step in rendered.frame.times[-1].steps if step.index >= 0}
+        drawn = [step.node for step in self._planned.plan.schedule.steps]
+        times = {node: self._pass_times[node] for node in dict.fromkeys(drawn) if node in self._pass_times}
         for entry in rendered.frame.passes:
             node = str(entry["node"])
-            if node in ran or node not in self._pass_times:
-                self._pass_times[node] = dict(entry)
+            if node in ran or node not in times:
+                times[node] = dict(entry) | {"first": is_first}
         if rendered.request.still:
-            self._full_ms = sum(entry["gpu_ms"] or entry["cpu_ms"] for entry in self._pass_times.values())
-        return [entry | {"ran": node in ran} for node, entry in self._pass_times.items()]
+            self._timed, self._pass_times = rendered.drawing.executable, times
+            self._full_ms = sum(entry["gpu_ms"] or entry["cpu_ms"] for entry in times.values())
+        return [entry | {"ran": node in ran} for node, entry in times.items()]
 
     def _render(self, request: RenderRequest) -> _Rendered:
         selection = request.selection
@@ -158,7 +168,10 @@ class RenderService:
             if self._planned is None or self._planned.linked is not linked:
                 self._planned = stages.plan(stages.expand(linked))
                 self._node_of_file = _nodes_by_file(self._planned)
-                self._revision += 1
+                described = describe(self._planned)
+                if described != self._described:  # not only the camera
+                    self._described = described
+                    self._revision += 1
         if not request.still:  # its description waits until it is still
             selection = self._reduce_size(selection, self._planned.linked.graph.size)
         return self._draw(self._expand(selection, request), request)
@@ -265,11 +278,13 @@ class RenderService:
 
     @_answer.register
     def _variant(self, request: messages.VariantRequest) -> Response:
-        if self._rendered is None:
-            return Response()
         opened = replace(request.opened, sets=(), patches=(), scene=None, size=None)
-        before, after = (stages.resolve(one).spec.plain() for one in (opened, self._rendered.request.selection))
+        self._link(request.selection)  # what does not link is not saved
+        linked = self._link(replace(request.selection, camera=None))  # with the scene's own cameras
+        before, after = stages.resolve(opened).spec.plain(), linked.spec.plain()
         variant = {"extends": opened.source} | diff(before, after)
+        if seen := _view_keys(request, linked):
+            variant["scene"] = _scene_keys(linked, request.folder) | seen
         return Response({"yaml": to_yaml(from_plain(variant, Source("variant")), origins=False)})
 
     # --- encoding, and errors ----------------------------------------------------------------------------------------
@@ -293,6 +308,28 @@ class RenderService:
             (n.place.line, n.id) for n in nodes if n.place and n.place.file == place.file and n.place.line <= place.line
         ]
         return max(above)[1] if above else None
+
+
+def _view_keys(request: messages.VariantRequest, linked: Linked) -> dict[str, Any]:
+    """Return what a scene file says of a camera that was moved, and of the surroundings of the command line."""
+    keys: dict[str, Any] = {}
+    opened = request.selection
+    if "=" in (opened.camera or ""):
+        keys["cameras"] = {next(iter(linked.scene.cameras), "main"): jsonable(keys_of(str(opened.camera)))}
+    if opened.environment is not None:
+        keys["environment"] = None if str(opened.environment) == "none" else {"file": str(opened.environment)}
+    if opened.ground:
+        keys["environment"] = (keys.get("environment") or {}) | {"ground": True}
+    return keys | ({"variant": opened.variant} if opened.variant else {})
+
+
+def _scene_keys(linked: Linked, folder: Path) -> dict[str, Any]:
+    """Return the scene of a pipeline as a mapping that a file in a folder may hold."""
+    file, changes = linked.spec.scene, linked.spec.scene_changes
+    keys = dict(changes.plain()) if changes is not None else {}
+    if file is not None:
+        keys["extends"] = file.stem if file in shipped_scenes().values() else os.path.relpath(file, folder)
+    return keys
 
 
 def _nodes_by_file(planned: Planned) -> dict[str, str]:

@@ -17,6 +17,7 @@ from msgspec import UNSET, structs
 
 from rendergraph.errors import Problem, UsageError
 from rendergraph.resources import shipped_pipelines
+from rendergraph.scene.camera_words import camera_words, described_camera
 from rendergraph.scene.model import Camera
 from rendergraph.session.selection import Selection
 from rendergraph.viewer import camera as cameras
@@ -26,6 +27,8 @@ from rendergraph.viewer.messages import RenderRequest, Response
 MOST_UNDO = 500
 MOST_COMPARED = 50
 """Snapshots and pipelines that are kept to compare with."""
+CAMERA = "camera"
+"""The path of the camera among the edits: a name, or words as `--camera` takes them."""
 _FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.ya?ml")
 _BARE = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")  # a word that needs no quotes in YAML
 _KEYWORDS = frozenset({"null", "true", "false", "Null", "NULL", "True", "TRUE", "False", "FALSE"})
@@ -33,7 +36,7 @@ _KEYWORDS = frozenset({"null", "true", "false", "Null", "NULL", "True", "TRUE", 
 
 @dataclass(frozen=True)
 class Edits:
-    """Settings by path (`ao.radius`, `shadows.type`, `light.occlusion`) in order, with undo and redo."""
+    """Settings by path (`ao.radius`, `shadows.type`, `light.occlusion`, `camera`) in order, with undo and redo."""
 
     current: Mapping[str, str] = field(default_factory=dict)
     before: tuple[Mapping[str, str], ...] = ()
@@ -46,7 +49,7 @@ class Edits:
     def set(self, path: str, value: Any, *, again: bool = False) -> Edits:
         """Set a value; `again` continues the last change (a slider that is still held) instead of adding one."""
         bare = isinstance(value, str) and _BARE.fullmatch(value) and value not in _KEYWORDS
-        text = value if bare else json.dumps(value)
+        text = value if bare or path == CAMERA else json.dumps(value)
         if self.current.get(path) == text:
             return self
         current = {**self.current, path: text}
@@ -73,7 +76,13 @@ class Edits:
 
 @dataclass
 class ViewState:
-    """The state of the pages; `held` is while something is dragged, `revision` of the description that pages have."""
+    """The state of the pages.
+
+    Attributes:
+        camera: while it is being moved; a drag that has ended is an edit.
+        held: while something is dragged.
+        revision: of the description that pages have.
+    """
 
     opened: Selection
     folder: Path
@@ -89,7 +98,6 @@ class ViewState:
     revision: int = 0
 
     def __post_init__(self) -> None:
-        self._selected = self.opened
         self._last_camera: Camera | None = None  # of the last picture
         self._sphere: cameras.Sphere = ((0.0, 0.0, 0.0), 1.0)
         self._others: dict[str, Selection] = {"as opened": self.opened}
@@ -101,7 +109,16 @@ class ViewState:
 
     @property
     def selection(self) -> Selection:
-        return structs.replace(self._selected, sets=(*self.opened.sets, *self.edits.sets))
+        """The pipeline with all edits, among them a camera that was moved."""
+        return structs.replace(self.opened, sets=(*self.opened.sets, *self.edits.sets))
+
+    @property
+    def moved_camera(self) -> Camera | None:
+        """The camera that was moved by hand; None if it is one of the scene's."""
+        words = self.selection.camera or ""
+        if self.camera is not None or "=" not in words or self._last_camera is None:
+            return self.camera
+        return described_camera(words, self._last_camera)
 
     @property
     def other(self) -> Selection | None:
@@ -129,8 +146,8 @@ class ViewState:
             "playing": self.playing,
             "port": self.port,
             "exposure_ev": self.exposure,
-            "camera": self._selected.camera,
-            "moved": self.camera is not None,
+            "camera": self.selection.camera,
+            "moved": self.camera is not None or "=" in (self.selection.camera or ""),
             "others": list(self._others),
             "other": self._other,
             "pipelines": list(shipped_pipelines()),
@@ -178,6 +195,7 @@ class ViewState:
                 self.playing = on
             case messages.HoldMessage(on):
                 was_held, self.held = self.held, on
+                self._keep_camera()
                 return was_held and not on  # the last picture is rendered once more in full quality
             case messages.RememberMessage():
                 self._snapshots += 1
@@ -195,14 +213,23 @@ class ViewState:
 
     def _move(self, message: messages.CameraMessage) -> None:
         if message.name is not UNSET:
-            self._selected, self.camera = structs.replace(self._selected, camera=message.name), None
+            self.camera = None
+            is_opened = message.name is None or message.name == self.opened.camera
+            self.edits = self.edits.drop(CAMERA) if is_opened else self.edits.set(CAMERA, message.name)
             return
-        camera = self.camera or self._last_camera
+        camera = self.camera or self.moved_camera or self._last_camera
         for move in (cameras.orbit, cameras.pan, cameras.zoom, cameras.fly, cameras.frame):
             amounts = getattr(message, move.__name__)
             if camera is not None and amounts is not None:
                 camera = move(camera, self._sphere, *amounts)
         self.camera = camera
+        self._keep_camera()
+
+    def _keep_camera(self) -> None:
+        """Make a camera that was moved an edit, once nothing is held: it can be undone, saved and copied."""
+        if self.camera is not None and not self.held:
+            self.edits = self.edits.set(CAMERA, camera_words(self.camera))
+            self.camera = None
 
     def _compare_with(self, name: str, selection: Selection) -> None:
         """Add something to compare with, in place of the oldest where there are too many."""

@@ -313,7 +313,7 @@ def test_the_keyboard_alone_is_enough(page: Hand) -> None:
     page.page.focus("#stage")
     page.after(lambda: page.page.keyboard.press("ArrowLeft"))
     page.page.wait_for_selector("#camera option:checked:has-text('moved by hand')", state="attached")
-    page.page.focus("#graph .card[aria-label^='light']")
+    page.page.focus("#graph [aria-label='Choose light']")
     page.page.keyboard.press("Enter")
     assert page.page.input_value("#node") == "light"
     page.page.focus("#tab-graph")

@@ -2,7 +2,7 @@
 import { $, choices, h, short } from "./dom.js";
 import { preview, showGraph, showPreviews } from "./graph.js";
 import { showParameters, startParameters } from "./parameters.js";
-import { address, showComparison, showPicture, showPixel, showTexture, startPicture } from "./picture.js";
+import { address, showComparison, showPicture, showPixel, showSmall, showTexture, startPicture } from "./picture.js";
 import { showMemory, showTimes } from "./plan.js";
 import { connect, dispatch, on, send } from "./socket.js";
 import "./slider.js";
@@ -20,8 +20,9 @@ const TABS = ["graph", "memory", "times", "changes"];
 
 const act = {
   node(id) { node = id; draw(); },
+  enable(name) { send({ do: "set", path: `${name}.enabled`, value: true }); },
   port(name) {
-    if (still && preview(name)) $("picture").src = preview(name);  // an exported page holds only the small one
+    if (still && preview(name)) showSmall(name, preview(name));  // an exported page holds only the small one
     send({ do: "look", port: state.port === name ? "" : name });
   },
 };
@@ -40,7 +41,8 @@ function draw() {
     const shown = ["", ...pipeline.outputs.slice(1), ...ports];
     if (state.port && !shown.includes(state.port)) shown.push(state.port);
     choices($("port"), shown, state.port ?? "", (name) => name || (pipeline.outputs[0] ?? "image"));
-    showParameters($("parameters"), pipeline, node, state.edits);
+    const { camera, ...settings } = state.edits;  // a camera that moves leaves the fields alone
+    showParameters($("parameters"), pipeline, node, settings);
     showGraph($("graph"), pipeline, { times, culled: pipeline.plan.culled, chosen: node, wrong }, act);
     showMemory($("memory"), pipeline);
   }
@@ -97,6 +99,7 @@ on("state", (facts) => { state = facts; showFrame(facts.frame); showProblems(); 
 on("pipeline", (facts) => { pipeline = facts; draw(); });
 on("picture", (facts, files) => {
   picture = facts;
+  comparison = null;  // it is of another picture; that with a still one follows
   history.push({ ms: facts.frame_ms, passes: facts.passes.filter((pass) => pass.ran) });
   if (history.length > 100) history.shift();
   showFrame(facts.frame);

@@ -29,7 +29,7 @@ function shapeOf(node) {
 }
 
 // The graph as ELK takes it: ports keep their order, inputs in the west (from the bottom), outputs in the east.
-function asElk(graph) {
+function asElk(graph, disabled) {
   const children = graph.nodes.map((node) => {
     const inputs = Object.keys(node.inputs), outputs = Object.keys(node.outputs);
     const port = (side, name, index, y) => ({
@@ -46,7 +46,8 @@ function asElk(graph) {
     id: `e${i}`, sources: [`${link.source}|out|${link.source_port}`], targets: [`${link.target}|in|${link.target_port}`],
   }));
   return {
-    id: "root", children, edges,
+    id: "root", edges,
+    children: [...children, ...disabled.map((name) => ({ id: `disabled ${name}`, width: WIDE, height: HEAD }))],
     layoutOptions: {
       "elk.algorithm": "layered", "elk.direction": "RIGHT", "elk.layered.spacing.nodeNodeBetweenLayers": "60",
       "elk.spacing.nodeNode": "24", "elk.edgeRouting": "SPLINES", "elk.layered.feedbackEdges": "true",
@@ -73,6 +74,25 @@ function describeOutput(output) {
   return output.bytes ? `${output.bytes} B` : output.kind;
 }
 
+// The attributes of a button in a drawing.
+const button = (label, press) => ({
+  tabindex: 0, role: "button", "aria-label": label,
+  onclick: (event) => { event.stopPropagation(); press(); },
+  onkeydown: (event) => {
+    if (event.key !== "Enter" && event.key !== " ") return;
+    event.preventDefault();
+    press();
+  },
+});
+
+// A node that is disabled has no ports and no place in the order; its button brings it back.
+function disabledCard(name, box, act) {
+  return s("g", { class: "card idle", transform: `translate(${box.x},${box.y})`, ...button(`Enable ${name}`, () => act.enable(name)) },
+    s("title", {}, `${name} is disabled; press to enable it`),
+    s("rect", { class: "box", width: box.width, height: box.height, rx: 6 }),
+    s("text", { x: 8, y: 16, "font-weight": 600 }, name), s("text", { x: 8, y: 31, class: "quiet" }, "disabled"));
+}
+
 function card(node, box, facts, act) {
   const { times, culled, chosen, wrong } = facts;
   const inputs = Object.keys(node.inputs), outputs = Object.entries(node.outputs);
@@ -80,25 +100,23 @@ function card(node, box, facts, act) {
   const idle = culled[node.id] !== undefined;
   const all = Math.max(1e-9, Object.values(times).reduce((sum, one) => sum + one, 0));
   const title = idle ? `${node.id} does not run: ${culled[node.id]}` : `${node.id}: ${node.type}`;
+  const clip = (text, most) => (text.length > most ? `${text.slice(0, most - 1)}…` : text);
   const group = s("g", {
     class: ["card", idle && "idle", chosen === node.id && "chosen", wrong.has(node.id) && "wrong"].filter(Boolean).join(" "),
-    transform: `translate(${box.x},${box.y})`, tabindex: 0, role: "button", "aria-label": title,
+    transform: `translate(${box.x},${box.y})`, role: "group", "aria-label": title, "data-node": node.id,
     onclick: () => act.node(node.id),
-    onkeydown: (event) => { if (event.key === "Enter") act.node(node.id); },
-  }, s("title", {}, title), s("rect", { class: "box", width: box.width, height: box.height, rx: 6 }));
+  }, s("title", {}, title), s("rect", { class: "box", width: box.width, height: box.height, rx: 6 }),
+  s("g", button(`Choose ${node.id}`, () => act.node(node.id)), s("rect", { class: "head", width: box.width, height: HEAD - 5 }),
+    s("text", { x: 8, y: 16, "font-weight": 600 }, clip(node.id, 18)), s("text", { x: 8, y: 31, class: "quiet" }, clip(node.type, 26))));
   if (ms !== undefined) {
     group.append(s("rect", { class: "time", x: 1, y: HEAD - 5, height: 3, width: Math.max(1, (ms / all) * (box.width - 2)) }));
     group.append(s("text", { x: box.width - 8, y: 16, "text-anchor": "end", class: "quiet" }, `${short(Number(ms.toFixed(2)))} ms`));
   }
-  const clip = (text, most) => (text.length > most ? `${text.slice(0, most - 1)}…` : text);
-  group.append(s("text", { x: 8, y: 16, "font-weight": 600 }, clip(node.id, 18)), s("text", { x: 8, y: 31, class: "quiet" }, clip(node.type, 26)));
   inputs.forEach((name, i) => group.append(s("text", { x: 8, y: HEAD + (i + 0.5) * ROW + 4, class: "quiet" }, clip(name, 26))));
   outputs.forEach(([name, output], i) => {
     const y = HEAD + (inputs.length + i + 0.5) * ROW + 4;
-    const show = (event) => { event.stopPropagation(); act.port(`${node.id}.${name}`); };
     group.append(s("g", {
-      class: "port", tabindex: 0, role: "button", "aria-label": `Show ${node.id}.${name}`, onclick: show,
-      onkeydown: (event) => { if (event.key === "Enter") show(event); },
+      class: "port", ...button(`Show ${node.id}.${name}`, () => act.port(`${node.id}.${name}`)),
     }, s("title", {}, `${describeOutput(output)}${output.used ? "" : ", unused"}`),
     s("text", { x: box.width - 8, y, "text-anchor": "end", class: output.used ? "" : "quiet" }, clip(name, 26))));
   });
@@ -127,9 +145,9 @@ export async function showGraph(container, pipeline, facts, act) {
   shown = next;
   const call = ++latest;
   const graph = pipeline.graph;
-  const key = JSON.stringify([graph.links, graph.nodes.map((node) => [node.id, Object.keys(node.inputs), Object.keys(node.outputs)])]);
+  const key = JSON.stringify([pipeline.disabled, graph.links, graph.nodes.map((node) => [node.id, Object.keys(node.inputs), Object.keys(node.outputs)])]);
   if (cached?.key !== key) {
-    const layout = await (await loadElk()).layout(asElk(graph));
+    const layout = await (await loadElk()).layout(asElk(graph, pipeline.disabled));
     cached = { key, layout };
   }
   if (call !== latest) return;  // a newer call has begun
@@ -148,9 +166,10 @@ export async function showGraph(container, pipeline, facts, act) {
     }
   });
   for (const node of graph.nodes) svg.append(card(node, box.get(node.id), facts, act));
+  for (const name of pipeline.disabled) svg.append(disabledCard(name, box.get(`disabled ${name}`), act));
   const focused = document.activeElement?.getAttribute?.("aria-label");
   const { scrollLeft, scrollTop } = container;
   container.replaceChildren(svg);
   container.scrollTo(scrollLeft, scrollTop);
-  if (focused) container.querySelector(`[aria-label="${CSS.escape(focused)}"]`)?.focus();
+  if (focused) container.querySelector(`[aria-label="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
 }

@@ -223,7 +223,7 @@ export function showParameters(container, pipeline, node, edits) {
   }
   if (!focused?.startsWith("p-")) return;
   const again = document.getElementById(focused);
-  again?.focus();
+  again?.focus({ preventScroll: true });
   if (again?.matches("input[type=number], input[type=text]")) again.select();  // as after Tab
 }
 

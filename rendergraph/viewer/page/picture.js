@@ -24,8 +24,8 @@ export function showPicture(facts, files) {
   picture.dataset.still = facts.still;
   if (facts.still) size = facts.size;
   if (facts.still && position) send({ do: "pixel", ...position });  // the values have changed
+  if (comparison) showComparison({}, {});  // that with this picture follows
   fit();
-  if (comparison) showComparison(comparison.facts, comparison.files);
 }
 
 // Fit the picture into the room; large texels keep sharp edges.
@@ -73,13 +73,28 @@ export function startPicture() {
     send({ do: "camera", ...move });
   };
 
+  // Two fingers zoom by their distance and pan by their middle.
+  const fingers = new Map();
+  const spread = () => {
+    const [a, b] = [...fingers.values()];
+    return [Math.hypot(a[0] - b[0], a[1] - b[1]), (a[0] + b[0]) / 2, (a[1] + b[1]) / 2];
+  };
+  const pinch = (event, height) => {
+    if (!fingers.has(event.pointerId)) return;
+    const [wide, x, y] = spread();
+    fingers.set(event.pointerId, [event.clientX, event.clientY]);
+    const [wider, nextX, nextY] = spread();
+    if (wide > 0 && wider > 0) send({ do: "camera", zoom: [wide / wider], pan: [(x - nextX) / height, (nextY - y) / height] });
+  };
+
   picture.draggable = false;
   addEventListener("resize", fit);
   stage.addEventListener("pointerdown", (event) => {
-    if (event.target.closest("input")) return;
+    if (event.target.closest("input, .divider")) return;
     stage.setPointerCapture(event.pointerId);
+    fingers.set(event.pointerId, [event.clientX, event.clientY]);
     last = [event.clientX, event.clientY];
-    send({ do: "hold", on: true });
+    if (fingers.size === 1) send({ do: "hold", on: true });
   });
   stage.addEventListener("pointermove", (event) => {
     const box = picture.hidden ? $("slider").under.getBoundingClientRect() : picture.getBoundingClientRect();
@@ -93,15 +108,17 @@ export function startPicture() {
       }
       return;
     }
+    if (fingers.size > 1) return pinch(event, box.height);
     const across = (event.clientX - last[0]) / box.height;
     const down = (event.clientY - last[1]) / box.height;
     last = [event.clientX, event.clientY];
     if (event.shiftKey || event.buttons & 6) send({ do: "camera", pan: [-across, down] });
     else send({ do: "camera", orbit: [across * 3, down * 3] });
   });
-  const release = () => {
-    if (last) send({ do: "hold", on: false });
-    last = null;
+  const release = (event) => {
+    fingers.delete(event.pointerId);
+    if (last && !fingers.size) send({ do: "hold", on: false });
+    last = fingers.size ? [...fingers.values()][0] : null;
   };
   stage.addEventListener("pointerup", release);
   stage.addEventListener("pointercancel", release);
@@ -126,6 +143,11 @@ export function startPicture() {
     moveCamera(move);
   });
   $("map").addEventListener("change", () => { if (comparison) showComparison(comparison.facts, comparison.files); });
+}
+
+// The thumbnail of a port, in place of the statistics.
+export function showSmall(name, source) {
+  $("texture").replaceChildren(h("h2", {}, name), h("img", { src: source, alt: `${name}, small` }));
 }
 
 // Statistics of the shown texture.

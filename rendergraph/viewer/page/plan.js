@@ -67,9 +67,10 @@ export function showTimes(container, picture, history) {
     const bar = h("div", { class: "meter" });
     bar.style.width = `${(time(pass) / most) * 100}%`;
     const quiet = pass.ran ? {} : { class: "quiet", title: "Not run for this picture: its result was still valid." };
+    const first = pass.first ? h("span", { class: "quiet", title: "The first run of these programs, which takes longer." }, " first run") : null;
     return h("tr", quiet, h("th", { scope: "row" }, pass.node), h("td", {}, pass.type),
       h("td", { class: "num" }, pass.gpu_ms === null ? "–" : short(Number(pass.gpu_ms.toFixed(3)))),
-      h("td", { class: "num" }, short(Number(pass.cpu_ms.toFixed(3)))), h("td", { width: "300" }, bar));
+      h("td", { class: "num" }, short(Number(pass.cpu_ms.toFixed(3)))), h("td", { width: "300" }, bar, first));
   });
   const sorted = history.map((one) => one.ms).sort((a, b) => a - b);
   const middle = sorted[Math.floor(sorted.length / 2)];

@@ -10,13 +10,22 @@ class PictureSlider extends HTMLElement {
     this.right = h("span", { class: "tag b" });
     this.range = h("input", { type: "range", min: 0, max: 1000, value: 500, "aria-label": "Position of the dividing line" });
     this.range.addEventListener("input", () => this.cut());
-    this.append(h("div", { class: "pile" }, this.under, this.over, this.left, this.right), this.range);
+    this.divider = h("div", { class: "divider" });
+    this.append(h("div", { class: "pile" }, this.under, this.over, this.left, this.right, this.divider), this.range);
+    this.divider.addEventListener("pointerdown", (event) => this.divider.setPointerCapture(event.pointerId));
+    this.divider.addEventListener("pointermove", (event) => {
+      if (!this.divider.hasPointerCapture(event.pointerId)) return;
+      const { left, width } = this.under.getBoundingClientRect();
+      this.range.value = ((event.clientX - left) / width) * 1000;
+      this.cut();
+    });
     this.range.addEventListener("pointerdown", (event) => event.stopPropagation());
     this.cut();
   }
 
   cut() {
     this.over.style.clipPath = `inset(0 0 0 ${this.range.value / 10}%)`;
+    this.divider.style.left = `${this.range.value / 10}%`;
   }
 
   show(mine, other, names) {
