@@ -63,6 +63,7 @@ def _generate(app: Sphinx, config: Config) -> None:
 _GENERATED = (
     (r"rendergraph/errors/(RG\d+)-[\w-]+\.yaml", r"errors/\1.md"),
     (r"rendergraph/errors/", "errors/index.md"),
+    (r"rendergraph/__init__\.py", "python.md"),
     (r"rendergraph/api/__init__\.py", "node-api.md"),
     (r"rendergraph/api/projection\.py", "views.md"),
     (r"rendergraph/cli/(\w+)\.py", r"cli.md#\1"),

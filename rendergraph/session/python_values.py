@@ -116,11 +116,12 @@ class Values:
             return os.fspath(value)
         if isinstance(value, str) and keys[-1:] == ("type",) and "\n" in value:
             return self._shader(value, keys[-2] if len(keys) > 1 else "shader")
-        if not hasattr(value, "tolist"):
-            return value
-        if getattr(value, "ndim", 0) < 2 or "params" in keys:
-            return value.tolist()
-        return self._input(value) if "inputs" in keys else self._image(value, keys)
+        return self._array(value, keys) if hasattr(value, "tolist") else value
+
+    def _array(self, array: Any, keys: tuple[str, ...]) -> Any:
+        if getattr(array, "ndim", 0) < 2 or "params" in keys:
+            return array.tolist()
+        return self._input(array) if "inputs" in keys else self._image(array, keys)
 
     def _file(self, content: bytes, name: str) -> Path:
         folder = _folder() / hashlib.sha256(content).hexdigest()[:16]

@@ -127,3 +127,8 @@ def test_scene_camera_and_environment_are_settings_too(base: Path) -> None:
         InputError, match=r"^--scene spere: RG015 there is no shipped scene 'spere'; did you mean 'spheres'"
     ):
         pipeline.set("scene", "spere").link()
+
+
+def test_a_mapping_for_a_scene_has_the_keys_of_scene_files() -> None:
+    with pytest.raises(InputError, match="RG320 a scene file has no key 'file'"):
+        rg.load({"extends": "forward", "scene": {"file": "a.glb"}}).check()
