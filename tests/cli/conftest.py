@@ -104,8 +104,8 @@ class FakeFrame:
 
     def info(self, name: str) -> Any:
         if name == "image":
-            return SimpleNamespace(semantic="display_color", format="rgba8", encoding="display")
-        return SimpleNamespace(semantic="radiance", format="rgba16f", encoding="linear")
+            return SimpleNamespace(semantic="display_color", format="rgba8", encoding="display", transparent=False)
+        return SimpleNamespace(semantic="radiance", format="rgba16f", encoding="linear", transparent=False)
 
     def as_json(self) -> dict[str, Any]:
         return {
