@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     "--subframes",
     type=click.IntRange(1, 4096),
     metavar="N",
-    default=1,
     help="Render each frame at N moments while the shutter is open, and average their light.",
 )
 @click.option("-o", "--output", "outputs", multiple=True, type=options.OUTPUT, help="Write an output to a file.")
@@ -87,6 +86,7 @@ def command(
     turntable: bool,
     resume: bool,
     fps: float | None,
+    subframes: int | None,
     outputs: tuple[Target, ...],
     taps: tuple[Target, ...],
     tap_all: Path | None,
@@ -127,8 +127,8 @@ def command(
         number, rate = linked.frames, fps or linked.fps
         if frames or seconds or turntable or any(is_film(target.path) for target in outputs):
             number = film_frames(linked.scene, rate, frames, seconds, turntable=turntable)
-        modes["turntable"] = number if turntable else None
-        return RenderOptions(number, rate, timed=as_json, **modes)
+        moments, circle = subframes or linked.subframes, number if turntable else None
+        return RenderOptions(number, rate, timed=as_json, subframes=moments, turntable=circle, **modes)
 
     warnings = Warnings()
     read = partial(_read, selection, render_options, outputs, taps, tap_all, warnings, resume=resume)

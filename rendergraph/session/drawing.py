@@ -174,7 +174,9 @@ class Drawing(Struct, eq=False, dict=True):
             types={node: graph[node].type.name for node in self._rendering_nodes},
             memory=plan.memory.as_json(),
             culled=dict(plan.schedule.culled),
-            metadata=self._metadata | frame_metadata(self.number, self.expanded.options.fps) | self._turned_camera(),
+            metadata=self._metadata
+            | frame_metadata(self.number, self.expanded.options.fps, self.expanded.options.subframes)
+            | self._turned_camera(),
             times=tuple(self.times),
             warnings=(*dict.fromkeys(self.gpu.cache.image_warnings), *self._frame_warnings(), *self._ray_notes),
         )

@@ -15,6 +15,7 @@ from msgspec import Struct
 
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.resources import shipped_pipelines
+from rendergraph.session.selection import MOST_SUBFRAMES
 from rendergraph.stamps import record_read
 
 if TYPE_CHECKING:
@@ -46,9 +47,10 @@ def pipeline_metadata(linked: Linked) -> dict[str, str]:
     return {f"rendergraph:{name}": text for name, text in fields.items() if text is not None}
 
 
-def frame_metadata(frame: int, fps: float) -> dict[str, str]:
-    """Return the metadata of one frame; the first frame has none."""
-    return {} if frame == 1 else {"rendergraph:frame": str(frame), "rendergraph:fps": f"{fps:g}"}
+def frame_metadata(frame: int, fps: float, subframes: int = 1) -> dict[str, str]:
+    """Return the metadata of one frame; the first frame has none unless it is a mean of moments."""
+    found = {"rendergraph:subframes": str(subframes)} if subframes > 1 else {}
+    return found | ({"rendergraph:frame": str(frame), "rendergraph:fps": f"{fps:g}"} if frame > 1 or found else {})
 
 
 def _inside(folder: Path) -> str | None:
@@ -67,6 +69,7 @@ class PictureMetadata(Struct, frozen=True):
     view: dict[str, Any]
     frame: int
     fps: float
+    subframes: int = 1
 
 
 def metadata(path: Path) -> dict[str, str]:
@@ -102,15 +105,16 @@ def read_picture_metadata(path: Path, limits: YamlLimits) -> PictureMetadata:
     return PictureMetadata(
         document,
         {name: kind(fields[name]) for name, kind in _VIEW.items() if name in fields},
-        _frame(fields),
+        _whole(fields, "frame", _MOST_FRAMES),
         _fps(fields),
+        _whole(fields, "subframes", MOST_SUBFRAMES + 1),
     )
 
 
-def _frame(fields: Mapping[str, str]) -> int:
-    text = fields.get("frame", "")
+def _whole(fields: Mapping[str, str], name: str, most: int) -> int:
+    text = fields.get(name, "")
     number = int(text) if re.fullmatch(r"[0-9]{1,10}", text) else 1
-    return number if 1 <= number < _MOST_FRAMES else 1
+    return number if 1 <= number < most else 1
 
 
 def _fps(fields: Mapping[str, str]) -> float:

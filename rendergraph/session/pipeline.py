@@ -236,7 +236,8 @@ class Pipeline:
     def expand(self, **options: Unpack[RenderKeywords]) -> Expanded:
         """Return all steps with what they read and write; the keywords are the fields of `RenderOptions`."""
         linked = self.link()
-        return stages.expand(linked, RenderOptions.of({"frames": linked.frames, "fps": linked.fps, **options}))
+        made: RenderKeywords = {"frames": linked.frames, "fps": linked.fps, "subframes": linked.subframes}
+        return stages.expand(linked, RenderOptions.of({**made, **options}))
 
     def plan(self, **options: Unpack[RenderKeywords]) -> ResourcePlan:
         """Return order and memory, without GL; the keywords are the fields of `RenderOptions`."""

@@ -64,10 +64,11 @@ def resolve(selection: Selection, catalog: Catalog | None = None, document: Docu
     catalog = catalog or Catalog.discover(selection.plugins)
     limits = YamlLimits(**selection.allowed("yaml"))
     source: str | Document | Mapping[str, Any] = document or selection.source
-    frames, fps = range(1, 2), 30.0
+    frames, fps, subframes = range(1, 2), 30.0, 1
     if is_picture(selection.source):
         picture = read_picture_metadata(Path(str(selection.source)), limits)
         source, frames, fps = picture.document, range(picture.frame, picture.frame + 1), picture.fps
+        subframes = picture.subframes
         view = {name: value for name, value in picture.view.items() if name not in selection.view}
         if "environment" in view:  # it must lie below an asset root: the user has not typed it
             Roots.of_file(Path("x"), selection.asset_roots).check(view["environment"], Place(str(selection.source)))
@@ -89,7 +90,7 @@ def resolve(selection: Selection, catalog: Catalog | None = None, document: Docu
         text = "missing format version: add `rendergraph: 1` as the first line"
         note = spec.tree.problem("RG016", text).as_warning()
         spec = replace(spec, notes=(*spec.notes, note))
-    return Resolved(selection=selection, catalog=catalog, spec=spec, frames=frames, fps=fps)
+    return Resolved(selection=selection, catalog=catalog, spec=spec, frames=frames, fps=fps, subframes=subframes)
 
 
 def _transparent(spec: PipelineSpec) -> list[str]:

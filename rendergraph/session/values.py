@@ -49,13 +49,14 @@ class OutputRequest(Struct, frozen=True):
 
 
 class Resolved(Struct, frozen=True, eq=False, kw_only=True):
-    """The file with everything applied; by default `frames` is the first frame, or the one that a picture shows."""
+    """The file with everything applied; by default `frames` is the first frame, or as a picture was made."""
 
     selection: Selection
     catalog: Catalog
     spec: PipelineSpec
     frames: range = range(1, 2)
     fps: float = 30.0
+    subframes: int = 1
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.selection.label}>"

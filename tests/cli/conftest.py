@@ -71,6 +71,7 @@ class FakeStages:
             warnings=(),
             frames=range(1, 2),
             fps=30.0,
+            subframes=1,
             scene=Scene("moving", orbit=Orbit("", 30)),
         )
 

@@ -144,6 +144,14 @@ def test_the_picture_is_jittered_once_a_frame(gl: rg.Session, scene: Path) -> No
     np.testing.assert_array_equal(many, one)
 
 
+def test_a_picture_of_moments_can_be_rendered_again(gl: rg.Session, scene: Path) -> None:
+    pipeline = rg.load("forward", scene=scene, size=SIZE, shutter=0.9)
+    frame = gl.render(pipeline, frames=range(4, 5), subframes=3)
+    frame.save(scene.parent / "mean.png")
+    again = gl.render(rg.load(scene.parent / "mean.png", asset_roots=[scene.parent]))
+    np.testing.assert_array_equal(again["image"], frame["image"])
+
+
 def test_bad_numbers(scene: Path) -> None:
     with pytest.raises(UsageError, match="subframes: expected a number from 1 to 4096, got 0"):
         rg.load("forward", scene=scene).expand(subframes=0)
