@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence, Set
+from functools import lru_cache
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 from math import prod
@@ -65,17 +66,23 @@ def _parts(source: SourceText) -> tuple[list[_Definition], list[tuple[list[str],
     definitions: list[_Definition] = []
     runs: list[tuple[list[str], list[int]]] = [([], [])]
     for text, at in _joined(source):
-        directive = _DIRECTIVE.match(text)
+        directive = _DIRECTIVE.match(text) if "#" in text else None
         if directive is not None and directive[1] == "define" and (found := _DEFINE.match(directive[2])):
             parameters = None if found[2] is None else tuple(p.strip() for p in found[3].split(",") if p.strip())
             definitions.append(_Definition(found[1], parameters, tuple(_TOKEN.findall(found[4]))))
-        words = _TOKEN.findall(text) if directive is None else []
+        words = _tokens(text) if directive is None else ()
         if directive is not None:
             runs.append(([], []))
-            words = _TOKEN.findall(directive[2]) if directive[1] in ("if", "elif") else []
+            words = _tokens(directive[2]) if directive[1] in ("if", "elif") else ()
         runs[-1][0].extend(words)
         runs[-1][1].extend([at] * len(words))
     return definitions, runs
+
+
+@lru_cache(8192)
+def _tokens(line: str) -> tuple[str, ...]:
+    """The words and signs of a line; shaders of variants and of one project share most lines."""
+    return tuple(_TOKEN.findall(line))
 
 
 def _joined(source: SourceText) -> Iterator[tuple[str, int]]:
@@ -124,13 +131,15 @@ class _Macros:
         self._definitions: dict[str, list[_Definition]] = {}
         for one in definitions:
             self._definitions.setdefault(one.name, []).append(one)
-        pairs = [pair for text in (*runs, *(one.body for one in definitions)) for pair in pairwise((*text, ""))]
-        known = {word for word, _ in pairs}
+        texts = [*runs, *(one.body for one in definitions)]
+        known = set().union(*texts)
         joined = [name for name in self._definitions if _joins(name, known)] if "##" in known else []
         self._pasted = {
             name: {made for one in alternatives for made in joined if _pastes(one, made)} - {name}
             for name, alternatives in self._definitions.items()
         }
+        calling = [text for text in texts if not self._called.isdisjoint(text)]
+        pairs = (pair for text in calling for pair in pairwise((*text, "")))
         handed = {word for word, following in pairs if word in self._called and following != "("}
         handed |= {name for names in self._pasted.values() for name in names & self._called}
         self.names = self._definitions.keys()

@@ -282,8 +282,9 @@ def find_old_names(source: SourceText, include_folder: Path) -> tuple[dict[str, 
     shipped = f"{include_folder.parent}/"
     own = [file for file in source.files if not str(file).startswith(shipped)]
     shared = SourceText(tuple(block for block in source.blocks if own and block.origin.file not in own)).text
-    for file, (old, new) in product(own, old_names(include_folder).items()):
-        name, text = old.strip("<>.()"), strip_comments(read_text(file))
+    texts = {file: strip_comments(read_text(file)) for file in own}
+    for (file, text), (old, new) in product(texts.items(), old_names(include_folder).items()):
+        name = old.strip("<>.()")
         match = re.search(old_name_pattern(old), text)
         defined = rf"(?m)^\s*\w+\s+{new}\s*\([^;{{}}]*\)\s*\{{|\b(?:define|struct)\s+{new}\b"
         is_own = match and name in declared(text) and re.search(defined, shared)  # not what an include lets it define
