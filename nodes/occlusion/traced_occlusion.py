@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from rendergraph.api import Input, Internal, Normal, Output, SceneData, Steps, define
+from rendergraph.api import ADD, Input, Internal, Normal, Output, SceneData, State, Steps, define
 
 from ._screen_space import ScreenSpaceOcclusion, reduced_size
+
+
+_MOST_RAYS = 128  # of a pixel in one step: drivers limit how long a step takes, and llvmpipe how often its loops turn
 
 
 class TracedOcclusion(ScreenSpaceOcclusion):
@@ -29,6 +32,7 @@ class TracedOcclusion(ScreenSpaceOcclusion):
         doc="Unit vector, the mean unoccluded direction, world space; 0 for background.",
     )
     unfiltered_vector = Internal(format="rgba16f", size=reduced_size)
+    rays = Internal(format="rgba32f", size=reduced_size, doc="Sum over the steps that many rays take.")
 
     samples: int = define(default=16, min=1, max=1024, doc="Rays per pixel.")
     animated: bool = define(default=True, doc="Trace other rays in each frame, for a mean over frames.")
@@ -39,15 +43,22 @@ class TracedOcclusion(ScreenSpaceOcclusion):
         reduced = self.size_defines(steps)
         macros = {**reduced, **({"HAS_VECTOR": 1} if self.bent_normal.name in out else {})}
         traced = self.unfiltered_vector if self.bent_normal.name in out else self.unfiltered
-        steps.fullscreen(
-            "traced_occlusion.frag",
-            out={"filtered": traced} if reduced else out,
-            defines=macros if reduced else {**macros, "FINAL": 1},
-            scene=self.scene,
-            depth=self.depth,
-            normal=self.normal,
-            reduced_size=steps.desc(traced).size,
-        )
+        reads: dict[str, Any] = {"scene": self.scene, "depth": self.depth, "normal": self.normal}
+        reads["reduced_size"] = steps.desc(traced).size
+        macros |= {} if reduced else {"FINAL": 1}
+        if self.samples > _MOST_RAYS:
+            for first in range(0, self.samples, _MOST_RAYS):
+                steps.fullscreen(
+                    "traced_occlusion.frag",
+                    out={"rays": self.rays},
+                    state=State(blend=ADD) if first else State(),
+                    defines={"FIRST_RAY": first, "PAST_RAY": min(first + _MOST_RAYS, self.samples)},
+                    label=f"rays {first + 1} to {min(first + _MOST_RAYS, self.samples)}",
+                    **reads,
+                )
+            macros["HAS_SUM"] = 1
+            reads["sum"] = self.rays
+        steps.fullscreen("traced_occlusion.frag", out={"filtered": traced} if reduced else out, defines=macros, **reads)
         if reduced:
             self.gather_surfaces(steps)
             self.upsample(steps, traced, out, macros)

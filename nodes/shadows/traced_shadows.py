@@ -8,6 +8,7 @@ import numpy as np
 
 from rendergraph.api import Any as AnyTexel
 from rendergraph.api import (
+    ADD,
     Depth,
     Facts,
     Function,
@@ -17,13 +18,18 @@ from rendergraph.api import (
     SceneData,
     ShadowLookup,
     ShadowMap,
+    State,
     Steps,
     Visibility,
     define,
     param,
+    structural,
 )
 
 from ._casting import Casting
+
+
+_MOST_RAYS = 128  # of a pixel in one step: drivers limit how long a step takes, and llvmpipe how often its loops turn
 
 
 def _light_texels(node: Any, facts: Facts) -> tuple[int, int]:
@@ -62,6 +68,11 @@ class TracedShadows(Casting):
         doc="1 is lit, 0 in shadow; one layer per light.",
     )
 
+    light: str | tuple[str, ...] = structural(
+        default="all",
+        doc="Lights that cast, unless a shadow map tells them: names, or `all` or `auto` (the first directional, else "
+        "spot, else point light) of those without `casts_shadow: false`.",
+    )
     size: float = param(
         default=0.0, unit="m", min=0, max=100, doc="Diameter of point and spot lights; 0: hard shadows."
     )
@@ -88,11 +99,15 @@ class TracedShadows(Casting):
         casters = np.zeros((1, max(1, len(steps.facts.lights)), 1), np.uint8)
         casters[0, list(lights), 0] = 255
         steps.upload(self.casters, casters)
+        starts = range(0, self.samples, _MOST_RAYS)
         for layer, light in enumerate(lights) if steps.used(self.visibility) else ():
-            steps.fullscreen(
-                "map_visibility.frag",
-                out={"visibility": self.visibility.layer(layer)},
-                depth=self.depth,
-                shadow=self.lookup,
-                defines={"LIGHT": light},
-            )
+            for first in starts:
+                rays = {"FIRST_RAY": first, "PAST_RAY": first + _MOST_RAYS} if len(starts) > 1 else {}
+                steps.fullscreen(
+                    "map_visibility.frag",
+                    out={"visibility": self.visibility.layer(layer)},
+                    state=State(blend=ADD) if first else State(),
+                    depth=self.depth,
+                    shadow=self.lookup,
+                    defines={"LIGHT": light, **rays},
+                )

@@ -4,7 +4,17 @@
 #include <ray_directions.glsl>
 #include <trace.glsl>
 #include "surfaces.glsl"
+#ifdef FIRST_RAY  // this step traces a part of the rays
+out vec4 rays;
+#else
 #include "outputs.glsl"
+#define FIRST_RAY 0
+#define PAST_RAY SAMPLES
+#define IS_LAST
+#endif
+#ifdef HAS_SUM
+uniform sampler2D sum;
+#endif
 
 uniform sampler2D normal;    // world space
 uniform ivec2 reduced_size;  // of the target
@@ -16,25 +26,37 @@ void main() {
     float window_depth;
     vec3 position = position_at(texel, TEXEL_CENTER, window_depth);
     if (is_nothing(window_depth)) {
+#ifdef IS_LAST
         write_outputs(OPEN_VALUE);
+#else
+        rays = vec4(0.0);
+#endif
         return;
     }
+    vec4 open = vec4(0.0);  // xyz: sum of the unoccluded directions, w: their number
+#ifdef HAS_SUM
+    open = texelFetch(sum, pixel, 0);
+#else
     vec3 axis = normalize(texelFetch(normal, texel, 0).xyz);
     vec3 geometric_normal = geometric_normal_at(texel, TEXEL_CENTER, position, window_depth);
     // At outlines the differences of depth are those of two surfaces.
     if (dot(geometric_normal, axis) < 0.25) geometric_normal = axis;
     vec3 origin = position + geometric_normal * ray_offset(position, linear_depth(depth_views[0], window_depth));
     vec2 shift = random_shift(pixel, ANIMATED * frame_index);
-    vec4 open = vec4(0.0);  // xyz: sum of the unoccluded directions, w: their number
-    for (int i = 0; i < SAMPLES; ++i) {
+    for (int i = FIRST_RAY; i < PAST_RAY; ++i) {
         vec3 ray = cosine_direction(axis, shifted_point(i, shift));
         Hit hit;
         if (!nearest_hit(origin, ray, 0.0, radius, hit)) open += vec4(ray, 1.0);
     }
+#endif
+#ifdef IS_LAST
     open.w /= float(SAMPLES);
 #ifdef HAS_VECTOR
     write_outputs(open);
 #else
     write_outputs(open.w);
+#endif
+#else
+    rays = open;
 #endif
 }

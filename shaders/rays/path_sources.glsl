@@ -118,7 +118,7 @@ SourceSample sample_source(
                 * (SPREAD_LIGHT * opacity(emitter.instance, emitter.triangle, barycentrics)
                     / max(found.density, 1e-37));
         }
-        found.ray = offset_ray(at, normal) - s.position;
+        found.ray = offset_ray(emitter.instance, at, normal) - s.position;
         found.reach = 1.0;
 #endif
     }

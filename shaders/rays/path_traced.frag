@@ -174,7 +174,7 @@ void main() {
                 arriving = source.light * thin_transmission(s, source.light_dir);
             }
 #endif
-            start = offset_ray(s.position, side * s.geometric_normal);
+            start = offset_ray(hit.instance, s.position, side * s.geometric_normal);
             if (source.reach == 1.0) source.ray += s.position - start;
             bool reaches = side * dot(source.ray, s.geometric_normal) > 0.0 && is_wanted(vertex)
                 && max(max(arriving.x, arriving.y), arriving.z) > 0.0;
@@ -200,7 +200,7 @@ void main() {
                 ends = !(side * dot(direction, s.geometric_normal) > 0.0 && strongest > 0.0 && ahead < 64u
                     && survival.y < survives);
                 throughput /= max(survives, 1e-6);
-                origin = offset_ray(s.position, side * s.geometric_normal);
+                origin = offset_ray(hit.instance, s.position, side * s.geometric_normal);
                 nearest = 0.0;
                 farthest = 1e30;
                 medium.has_entered = true;
@@ -212,7 +212,7 @@ void main() {
         }
 #endif
         if (reflects) {
-            start = offset_ray(s.position, s.geometric_normal);
+            start = offset_ray(hit.instance, s.position, s.geometric_normal);
             direction = reflected_direction(s, xi);
             density = reflected_density(s, direction);
             bool goes_on = dot(direction, s.geometric_normal) > 0.0 && density > 0.0;

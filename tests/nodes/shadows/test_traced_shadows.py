@@ -92,10 +92,13 @@ def test_what_lies_behind_a_lamp_casts_no_shadow(session: rg.Session, tmp_path: 
     assert visibility[0][on_floor].min() == 1.0
 
 
-@pytest.mark.parametrize(("kind", "width"), [("point", 0.8), ("directional", 0.3)])
-def test_soft_shadows_are_the_mean_over_a_disc(session: rg.Session, tmp_path: Path, kind: str, width: float) -> None:
+@pytest.mark.parametrize(("kind", "width", "rays"), [("point", 0.8, 64), ("directional", 0.3, 160)])
+def test_soft_shadows_are_the_mean_over_a_disc(
+    session: rg.Session, tmp_path: Path, kind: str, width: float, rays: int
+) -> None:
+    """Also if the rays take several steps."""
     setting = f"shadows.{'angle' if kind == 'directional' else 'size'}={width}"
-    visibility, points = draw(session, tmp_path, LIGHTS[kind], setting, "shadows.samples=64")
+    visibility, points = draw(session, tmp_path, LIGHTS[kind], setting, f"shadows.samples={rays}")
     on_floor = np.abs(points[..., 1]) < 1e-3
     expected = expected_visibility(points[on_floor], kind, width, 256)
     error = visibility[0][on_floor] - expected
