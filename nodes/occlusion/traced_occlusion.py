@@ -8,7 +8,6 @@ from rendergraph.api import ADD, Input, Internal, Normal, Output, SceneData, Sta
 
 from ._screen_space import ScreenSpaceOcclusion, reduced_size
 
-
 _MOST_RAYS = 128  # of a pixel in one step: drivers limit how long a step takes, and llvmpipe how often its loops turn
 
 
@@ -52,7 +51,7 @@ class TracedOcclusion(ScreenSpaceOcclusion):
                     "traced_occlusion.frag",
                     out={"rays": self.rays},
                     state=State(blend=ADD) if first else State(),
-                    defines={"FIRST_RAY": first, "PAST_RAY": min(first + _MOST_RAYS, self.samples)},
+                    defines={**reduced, "FIRST_RAY": first, "PAST_RAY": min(first + _MOST_RAYS, self.samples)},
                     label=f"rays {first + 1} to {min(first + _MOST_RAYS, self.samples)}",
                     **reads,
                 )

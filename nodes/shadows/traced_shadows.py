@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from rendergraph.api import Any as AnyTexel
 from rendergraph.api import (
     ADD,
     Depth,
@@ -25,9 +24,9 @@ from rendergraph.api import (
     param,
     structural,
 )
+from rendergraph.api import Any as AnyTexel
 
 from ._casting import Casting
-
 
 _MOST_RAYS = 128  # of a pixel in one step: drivers limit how long a step takes, and llvmpipe how often its loops turn
 

@@ -191,7 +191,7 @@ def data_macros(scene: Scene, packed: PackedScene, arrays: TextureArrays) -> dic
     macros |= {f"SCENE_{slot.upper()}_ARRAYS": str(bits) for slot, bits in used.items() if bits}
     if any(map(scene.has_grain, scene.materials)):
         macros["SCENE_GRAIN"] = "1"
-    for number in {placed.material for placed in scene.objects}:
+    for number in sorted({placed.material for placed in scene.objects}):
         macros |= {f"SCENE_ANY_{layer.upper()}": "1" for layer in scene.layers(scene.materials[number])}
     for mode, name in (("mask", "SCENE_ANY_MASKED"), ("blend", "SCENE_ANY_BLENDED")):
         if mode in packed.alpha_mode:

@@ -123,7 +123,9 @@ def sheen_albedo(roughness: float, angle: float) -> float:
     d, e = (low + (high - low) * t for low, high in ((-1.97760, -1.27393), (-4.32054, -4.85967)))
 
     def masking(x: Any) -> Any:
-        fit = lambda x: a / (1 + b * x**c) + d * x + e  # noqa: E731 - as the paper writes it
+        def fit(x: Any) -> Any:
+            return a / (1 + b * x**c) + d * x + e
+
         return np.exp(np.where(x < 0.5, fit(x), 2 * fit(0.5) - fit(np.maximum(1 - x, 1e-5))))
 
     u, azimuth = np.meshgrid((np.arange(400) + 0.5) / 400, (np.arange(400) + 0.5) / 400 * np.pi)
