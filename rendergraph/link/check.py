@@ -34,7 +34,9 @@ class Checker(Struct, eq=False):
             before = len(self.problems)
             for name, links in draft.links.items():
                 for link in links:
-                    if (info := self.textures.get(link.source.now)) is not None:
+                    info = self.textures.get(link.source.now)
+                    # What a node makes that has lost its source may be of another kind than it would be.
+                    if info is not None and not self.nodes[link.source.node].lost_links:
                         self._link(draft, draft.inputs[name], link, info)
             if len(self.problems) == before:
                 self._sizes(draft)

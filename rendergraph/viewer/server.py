@@ -234,8 +234,7 @@ class Server:
                 self._query(page, request, lambda found: page.put("pixel", _text("pixel", dict(found.facts))))
             case messages.SaveMessage():
                 path = self._state.variant_file(message.name)
-                state = self._state
-                variant = messages.VariantRequest(state.opened, state.selection, state.folder)
+                variant = messages.VariantRequest(self._state.opened, self._state.selection, self._state.folder)
                 self._query(page, variant, lambda found: page.put("saved", _save(path, found)))
             case _:
                 if isinstance(message, messages.HoldMessage):

@@ -333,7 +333,7 @@ def test_endpoints_by_name(glowing: Path, toy_catalog: Catalog) -> None:
     assert endpoint(graph, "glow/blur.across") == Endpoint("glow/blur", "across")
     for wrong, message in (
         ("dispaly.color", "RG109 there is no node 'dispaly'; did you mean 'display'"),
-        ("display", "RG109 there is no node 'display'; write NODE.PORT"),
+        ("display", "RG109 'display' is a node, not a port; write one of display.color"),
         ("display.colour", "RG112 node 'display' has no output 'colour'; did you mean 'color'"),
     ):
         with pytest.raises(InputError, match=message):
