@@ -31,8 +31,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-MOST_SIDE = 1024
-"""Limit of width and height: pictures travel in messages, and software renderers are slow."""
+MOST_SIDE = 1024  # of a picture, which travels in a message, and which a CPU may have to render
 _INSTRUCTIONS = """Renderers are YAML files, whose nodes are render passes. A `pipeline` is a shipped name (`forward`),
 a YAML file, or the YAML text of a pipeline itself, such as `extends: forward` with changes. `settings` are texts such
 as `shadows.taps=4`, `ao.enabled=false` or `scene.lights.key.intensity=2`. Begin with `explain` of `pipeline`."""
@@ -51,7 +50,6 @@ def command(root: str, write: bool, as_json: bool) -> None:
 
     \b
     Examples:
-      rendergraph mcp
       rendergraph mcp --root study --write
     """
     if as_json:
