@@ -292,7 +292,7 @@ SELECTION_OPTIONS = {
         type=SETTING,
         shell_complete=offered("settings"),
         help="Set a parameter, connect an input, change a type, or disable a node: ao.radius=0.5, light.lookup=null, "
-        "sun.type=T, ao.enabled=false.",
+        "sun.type=T, ao.enabled=false, scene.lights.sun.intensity=2.",
     ),
     "patches": click.option("-p", "--patch", "patches", multiple=True, type=_PATH, help="Apply a merge patch file."),
     "asset_roots": click.option(
