@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import inspect
 import json
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import partial
 from importlib.machinery import ModuleSpec
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rendergraph.catalog.catalog import NOTEBOOK
 from rendergraph.errors import InputError
 from rendergraph.farm.bundle import file_sha256
 from rendergraph.program import stage_texts, text_key
@@ -99,6 +102,9 @@ def _code(graph: Graph) -> Iterator[str]:
             yield file_digest(node.type.file)  # its header's declarations
         else:
             yield from _module_digests(type(node.node).__module__, seen)
+            if node.type.plugin == NOTEBOOK:  # a module without a file
+                with suppress(OSError, TypeError):
+                    yield inspect.getsource(type(node.node))
 
 
 def _module_digests(name: str, seen: set[str]) -> Iterator[str]:
