@@ -1,20 +1,24 @@
 """Speed of path tracing, and its cost against the number of triangles.
 
-`python tests/bench/bench_rays.py [SCENE ...]`; without arguments the Cornell box, the courtyard and ever finer spheres.
+`python tests/bench/bench_rays.py [SCENE ...] [FILE.svg]`; without scenes the Cornell box, the courtyard and ever finer
+spheres, whose cost is drawn into the file.
 Run it without `GALLIVM_PERF=nopt`, which slows shaders down. Wall time means little while others use the machine; CPU
 time is that of all threads of the process.
 """
 
 from __future__ import annotations
 
+import math
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import rendergraph as rg
 
 SIZE, SAMPLES = (320, 180), 16
+SIDES = (8, 16, 32, 64, 128, 256, 512)
 SEGMENTS = {"cornell_box": 2.16, "courtyard": 2.63}
 """Rays with their shadow rays that a path has on average, as counted once in the shader."""
 
@@ -39,21 +43,52 @@ def sphere_scene(target: Path, side: int) -> Path:
     return target
 
 
+def plot(file: Path, costs: Sequence[tuple[int, float]]) -> None:
+    """Draw microseconds of a path against triangles, on a logarithmic axis, as SVG."""
+    low, high = math.log10(costs[0][0]), math.log10(costs[-1][0])
+    top = max(cost for _, cost in costs) * 1.15
+    points = [(70 + 500 * (math.log10(n) - low) / (high - low), 250 - 220 * cost / top) for n, cost in costs]
+    parts = ['<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 620 310" font-family="sans-serif" font-size="14">']
+    parts.append('<rect width="620" height="310" fill="white"/>')
+    for power in range(math.ceil(low), math.floor(high) + 1):
+        x = 70 + 500 * (power - low) / (high - low)
+        parts.append(f'<line x1="{x:.1f}" y1="30" x2="{x:.1f}" y2="250" stroke="#ddd"/>')
+        parts.append(f'<text x="{x:.1f}" y="270" text-anchor="middle">{10**power:,}</text>')
+    for number in range(5):
+        value = top * number / 4
+        y = 250 - 220 * value / top
+        parts.append(f'<line x1="70" y1="{y:.1f}" x2="570" y2="{y:.1f}" stroke="#ddd"/>')
+        parts.append(f'<text x="62" y="{y + 5:.1f}" text-anchor="end">{value:.2g}</text>')
+    line = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
+    parts.append(f'<polyline points="{line}" fill="none" stroke="#1f5fa8" stroke-width="2"/>')
+    parts += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="#1f5fa8"/>' for x, y in points]
+    parts.append('<text x="320" y="296" text-anchor="middle">triangles of a sphere</text>')
+    parts.append('<text x="70" y="20">µs of CPU time for a path</text></svg>')
+    file.write_text("\n".join(parts) + "\n")
+
+
 def main() -> None:
     """Print paths and segments a second of each scene."""
-    scenes: list[str | Path] = list(sys.argv[1:])
+    arguments = [argument for argument in sys.argv[1:] if not argument.endswith(".svg")]
+    pictures = [Path(argument) for argument in sys.argv[1:] if argument.endswith(".svg")]
+    scenes: list[str | Path] = list(arguments)
     paths = SIZE[0] * SIZE[1] * SAMPLES
+    costs = []
     with rg.Session() as session, tempfile.TemporaryDirectory() as name:
+        spheres = {sphere_scene(Path(name) / f"sphere_{side}.yaml", side): 2 * side**2 for side in SIDES}
         if not scenes:
-            scenes = [*SEGMENTS, *(sphere_scene(Path(name) / f"sphere_{side}.yaml", side) for side in (16, 64, 256))]
+            scenes = [*SEGMENTS, *spheres]
         for scene in scenes:
             cpu, wall = measure(session, scene)
             text = f"{Path(scene).stem:12} {paths / cpu / 1e6:5.2f} M paths a CPU second, {paths / wall / 1e6:5.2f} a second"
             each = SEGMENTS.get(str(scene))
-            print(
-                text
-                + (f"; {each * paths / cpu / 1e6:5.2f} and {each * paths / wall / 1e6:5.2f} M segments" if each else "")
-            )
+            if each:
+                text += f"; {each * paths / cpu / 1e6:5.2f} and {each * paths / wall / 1e6:5.2f} M segments"
+            print(text, flush=True)
+            if scene in spheres:
+                costs.append((spheres[Path(scene)], cpu / paths * 1e6))
+    for picture in pictures if costs else ():
+        plot(picture, costs)
 
 
 if __name__ == "__main__":
