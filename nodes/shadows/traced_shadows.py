@@ -69,8 +69,8 @@ class TracedShadows(Casting):
 
     light: str | tuple[str, ...] = structural(
         default="all",
-        doc="Lights that cast, unless a shadow map tells them: names, or `all` or `auto` (the first directional, else "
-        "spot, else point light) of those without `casts_shadow: false`.",
+        doc="Lights that cast, unless a shadow map tells them: names, `all` without `casts_shadow: false`, or `auto`, "
+        "the first of these.",
     )
     size: float = param(
         default=0.0, unit="m", min=0, max=100, doc="Diameter of point and spot lights; 0: hard shadows."
