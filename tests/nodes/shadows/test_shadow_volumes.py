@@ -180,7 +180,7 @@ def test_rectangles_of_lights_save_most_fragments_and_change_no_pixel(
     session: rg.Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Samples that pass, by the driver's own count: eight lights of range 4 over a floor of 16 m."""
-    lights = ", ".join(f"{ring}_{k}" for ring in ("inner", "outer") for k in range(1, 5))
+    lights = ", ".join(f"{ring}.{k}" for ring in ("inner", "outer") for k in range(1, 5))
     sets = (f"shadows.light=[{lights}]", "shadows.method=zpass")
     loaded = rg.load(PIPELINE, scene="many_lights", size=SIZE, sets=sets)
 
