@@ -44,7 +44,9 @@ LayerTexels scene_layer_texels(
     if (scene_texel(instance, CLEARCOAT_SLOT, SCENE_CLEARCOAT_ARRAYS, c, texel)) layers.clearcoat.x = texel.r;
 #endif
 #if defined(SCENE_CLEARCOAT_ROUGHNESS_ARRAYS) && defined(CLEARCOAT_LAYER)
-    if (scene_texel(instance, CLEARCOAT_ROUGHNESS_SLOT, SCENE_CLEARCOAT_ROUGHNESS_ARRAYS, c, texel)) layers.clearcoat.y = texel.g;
+    if (scene_texel(instance, CLEARCOAT_ROUGHNESS_SLOT, SCENE_CLEARCOAT_ROUGHNESS_ARRAYS, c, texel)) {
+        layers.clearcoat.y = texel.g;
+    }
 #endif
 #if defined(SCENE_SHEEN_COLOR_ARRAYS) && defined(SHEEN_LAYER)
     if (scene_texel(instance, SHEEN_COLOR_SLOT, SCENE_SHEEN_COLOR_ARRAYS, c, texel)) layers.sheen.rgb = texel.rgb;
@@ -56,7 +58,9 @@ LayerTexels scene_layer_texels(
     if (scene_texel(instance, IRIDESCENCE_SLOT, SCENE_IRIDESCENCE_ARRAYS, c, texel)) layers.iridescence.x = texel.r;
 #endif
 #if defined(SCENE_IRIDESCENCE_THICKNESS_ARRAYS) && defined(IRIDESCENCE_LAYER)
-    if (scene_texel(instance, IRIDESCENCE_THICKNESS_SLOT, SCENE_IRIDESCENCE_THICKNESS_ARRAYS, c, texel)) layers.iridescence.y = texel.g;
+    if (scene_texel(instance, IRIDESCENCE_THICKNESS_SLOT, SCENE_IRIDESCENCE_THICKNESS_ARRAYS, c, texel)) {
+        layers.iridescence.y = texel.g;
+    }
 #endif
 #if defined(SCENE_TRANSMISSION_ARRAYS) && defined(TRANSMISSION_LAYER)
     if (scene_texel(instance, TRANSMISSION_SLOT, SCENE_TRANSMISSION_ARRAYS, c, texel)) layers.transmission.x = texel.r;

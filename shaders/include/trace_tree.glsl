@@ -33,8 +33,8 @@ vec3 trace_permuted(vec3 v, int last) {
 //
 // Each turn of the inner loop visits two nodes and tests a triangle, and invocations leave it only when nothing is left
 // of the tree. Those that a processor runs in lockstep then do the same work most of the time, and the set of those
-// that are active seldom changes, which llvmpipe's branches can predict. The stack cannot overflow: depths of trees are limited when they are built, and
-// TRACE_STACK follows from the limits.
+// that are active seldom changes, which llvmpipe's branches can predict. The stack cannot overflow: depths of trees are
+// limited when they are built, and TRACE_STACK follows from the limits.
 bool trace(
     vec3 origin, vec3 direction, float nearest, float farthest, int wanted, int rejected, bool any, int passing,
     out Hit hit, out bool ends) {

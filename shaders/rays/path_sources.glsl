@@ -64,7 +64,7 @@ vec3 source_chances(vec3 position, float lights) {
 
 // A point or direction of one source of light, which a shadow ray has still to reach.
 struct SourceSample {
-    vec3 light;      // radiance times SPREAD_LIGHT, or the irradiance of a punctual light; over the density of the choice
+    vec3 light;      // radiance times SPREAD_LIGHT, or irradiance of a punctual light; over the density of the choice
     vec3 light_dir;  // unit
     float density;   // of the choice in 1/sr; 0 for a punctual light, which nothing else finds
     bool is_environment;  // `light` and `density` still lack the environment's radiance and density

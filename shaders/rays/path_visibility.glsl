@@ -16,7 +16,7 @@ float opacity(int instance, int triangle, vec2 barycentrics) {
 }
 
 #ifdef TRANSMISSION_LAYER
-// Light that passes straight through a transmissive surface: all of it through a thin wall, and half of it, as a factor,
+// Light that passes straight through a transmissive surface: all of it through a thin wall, and the root of this factor
 // through each of the two sides of a volume.
 vec3 passing_light(Hit hit) {
     MaterialData m = materials[MATERIAL_INDEX(scene_instances[hit.instance].material)];
@@ -41,7 +41,8 @@ vec3 visibility(vec3 origin, vec3 direction, float farthest, int wanted) {
     vec3 passed = vec3(1.0);
     float nearest = 0.0;
     bool ends;
-    while (max(max(passed.r, passed.g), passed.b) > 0.0 && trace(origin, direction, nearest, farthest, wanted, 0, true, passing, hit, ends)) {
+    while (max(max(passed.r, passed.g), passed.b) > 0.0
+            && trace(origin, direction, nearest, farthest, wanted, 0, true, passing, hit, ends)) {
         nearest = hit.distance;
         vec3 stopped = vec3(opacity(hit.instance, hit.triangle, hit.barycentrics));
 #ifdef TRANSMISSION_LAYER
