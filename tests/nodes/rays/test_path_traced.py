@@ -191,11 +191,11 @@ def layer_albedos(degrees: float) -> dict[str, float]:
     }
 
 
-@pytest.mark.parametrize(("samples", "error"), [(64, 0.02), pytest.param(2048, 0.003, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize(("samples", "error"), [(64, 0.02), pytest.param(2048, 0.004, marks=pytest.mark.nightly)])
 def test_every_layer_reflects_and_transmits_its_albedo(
     session: rg.Session, tmp_path: Path, samples: int, error: float
 ) -> None:
-    """A film on a perfect mirror keeps all light, and a thin pane lets through what it does not reflect."""
+    """A thin pane lets through what it does not reflect; sheen loses 0.3 % where its grazing light is limited to 1."""
     found = furnace(session, tmp_path, {"background": 1}, 50, samples, LAYERS)
     expected = layer_albedos(50)
     assert {name: found[name] for name in ("coat", "cloth", "pane")} == pytest.approx(
