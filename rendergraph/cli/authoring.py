@@ -49,7 +49,7 @@ def copy(name: str, as_json: bool) -> None:
 
     \b
     Examples:
-      rendergraph copy bloom
+      rendergraph copy deferred
       rendergraph copy cornell_box
       rendergraph copy node:bloom
     """
