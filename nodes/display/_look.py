@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import textwrap
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -96,12 +98,17 @@ def _of_cube(file: InputFile) -> Look:
     if len(words) != 1 or not words[0].isdecimal() or not 2 <= int(words[0]) <= most:
         raise _wrong(file, number, f"{sizes[0]} is a whole number from 2 to {most}")
     side = int(words[0])
-    low = _row(file, *head.get("DOMAIN_MIN", (0, ["0"] * 3)))
-    high = _row(file, *head.get("DOMAIN_MAX", (0, ["1"] * 3)))
+    low_key, high_key = "DOMAIN_MIN", "DOMAIN_MAX"
+    if (span := sizes[0].replace("SIZE", "INPUT_RANGE")) in head:  # as DaVinci Resolve writes both for all channels
+        number, words = head[span]
+        if len(words) != 2 or low_key in head or high_key in head:
+            raise _wrong(file, number, f"{span} is two numbers in place of {low_key} and {high_key}")
+        head |= {low_key: (number, words[:1] * 3), high_key: (number, words[1:] * 3)}
+    low = _row(file, *head.get(low_key, (0, ["0"] * 3)))
+    high = _row(file, *head.get(high_key, (0, ["1"] * 3)))
     if not all(a < b for a, b in zip(low, high, strict=True)):
-        raise _wrong(
-            file, head.get("DOMAIN_MAX", head.get("DOMAIN_MIN", (1, [])))[0], "DOMAIN_MIN is not below DOMAIN_MAX"
-        )
+        number = head.get(high_key, head.get(low_key, (1, [])))[0]
+        raise _wrong(file, number, "the domain does not begin below its end")
     expected = side**3 if is_cube else side
     if len(rows) != expected:
         end = len(text.splitlines())
@@ -192,4 +199,6 @@ def _baked(file: InputFile, result: oiio.ImageBuf) -> Floats:
 
 
 def _reason(text: str) -> str:
-    return " ".join(text.split())[:200] or "OpenColorIO cannot read it"
+    """Return what the first reader for the file's extension says, where several have tried."""
+    parts = re.split(r"'[^']*' failed with: ", text)
+    return textwrap.shorten(parts[min(1, len(parts) - 1)], 200, placeholder=" …") or "OpenColorIO cannot read it"

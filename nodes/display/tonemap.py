@@ -134,6 +134,8 @@ class Tonemap(Node):
             ValueError: its file is malformed, or has no look of that name.
         """
         if self.look is None:
+            if self.look_name:
+                raise ValueError("'look_name' needs a 'look': a configuration (.ocio, .ocioz)")
             return None
         from ._look import load_look  # for looks alone
 

@@ -130,6 +130,24 @@ def test_the_domain_of_a_table(session: rg.Session, tmp_path: Path) -> None:
     np.testing.assert_allclose(through(session, colors, tmp_path / "part.cube"), expected, atol=0.55 / 255)
 
 
+@pytest.mark.parametrize("kind", ["3D", "1D"])
+def test_the_range_of_a_table_agrees_with_opencolorio(session: rg.Session, tmp_path: Path, kind: str) -> None:
+    table = grid(SIDE) if kind == "3D" else np.repeat(np.linspace(0, 1, 33)[:, None], 3, axis=1)
+    text = cube_text(table, kind, f"LUT_{kind}_INPUT_RANGE 0.25 1.5\n")
+    (tmp_path / "part.cube").write_text(text.partition("\n")[2])  # OpenColorIO takes no TITLE beside a range
+    colors = display_colors(7)
+    picture = oiio.ImageBuf(oiio.ImageSpec(colors.shape[1], 1, 3, "float"))
+    picture.set_pixels(oiio.ROI(), np.ascontiguousarray(colors, np.float32))
+    expected = oiio.ImageBufAlgo.ociofiletransform(picture, str(tmp_path / "part.cube"), unpremult=False)
+    found = through(session, colors, tmp_path / "part.cube")
+    np.testing.assert_allclose(found, np.asarray(expected.get_pixels(oiio.FLOAT), np.float64), atol=1 / 255)
+
+
+def test_a_name_without_a_look_is_refused() -> None:
+    with pytest.raises(InputError, match=r"RG104 node 'display' .tonemap.: 'look_name' needs a 'look'"):
+        rg.load("forward", sets=["display.look_name=flatter"]).link()
+
+
 def test_other_files_of_opencolorio(session: rg.Session, tmp_path: Path) -> None:
     """A colour correction after the ASC: slope, offset and power of each channel."""
     (tmp_path / "warm.cc").write_text(
@@ -181,7 +199,9 @@ def test_a_look_is_beside_the_file_that_names_it(session: rg.Session, tmp_path: 
         ("LUT_1D_SIZE 2\n0 0 0\n1 1 1,0\n", "look.cube:3: expected three numbers, got '1 1 1,0'"),
         ("LUT_1D_SIZE 2\n0 0 nan\n1 1 1\n", "look.cube:2: expected finite numbers, got '0 0 nan'"),
         ("LUT_1D_SIZE 2\n0 0 0\nTITLE x\n1 1 1\n", "look.cube:3: 'TITLE' comes behind the first row"),
-        ("DOMAIN_MIN 0 0 1\nLUT_1D_SIZE 2\n0 0 0\n1 1 1\n", "look.cube:1: DOMAIN_MIN is not below DOMAIN_MAX"),
+        ("DOMAIN_MIN 0 0 1\nLUT_1D_SIZE 2\n0 0 0\n1 1 1\n", "look.cube:1: the domain does not begin below its end"),
+        ("LUT_1D_SIZE 2\nLUT_1D_INPUT_RANGE 1 1\n0 0 0\n1 1 1\n", "look.cube:2: the domain does not begin below"),
+        ("LUT_1D_INPUT_RANGE 1\nLUT_1D_SIZE 2\n0 0 0\n1 1 1\n", "look.cube:1: LUT_1D_INPUT_RANGE is two numbers"),
         ("DOMAIN_MAX 1 1\nLUT_1D_SIZE 2\n0 0 0\n1 1 1\n", "look.cube:1: expected three numbers, got '1 1'"),
     ],
 )
@@ -201,6 +221,7 @@ def test_malformed_tables_are_told_with_both_places(tmp_path: Path, text: str, m
         ("a.ocio", "nothing", (), "a.ocio: "),
         ("a.cube", "LUT_1D_SIZE 2\n0 0 0\n1 1 1\n", ("look_name=x",), "'look_name' is for configurations"),
         ("a.txt", "nothing", (), "a.txt: "),
+        ("a.3dl", "nothing", (), "a.3dl: Error parsing .3dl file"),
     ],
 )
 def test_what_opencolorio_refuses(tmp_path: Path, name: str, text: str, sets: tuple[str, ...], message: str) -> None:
