@@ -14,7 +14,7 @@ from msgspec import Struct
 
 from rendergraph.errors import InputError, Place, Problem, UsageError, suggestion
 from rendergraph.images.encode import EXTENSIONS, Job, picture_bytes, write_all
-from rendergraph.images.viewable import Bytes, viewable
+from rendergraph.images.viewable import Bytes, from_srgb, viewable
 from rendergraph.textures import FORMATS
 
 Pixels: TypeAlias = npt.NDArray[Any]
@@ -94,15 +94,20 @@ def encoded(file: Saved, metadata: Mapping[str, str]) -> bytes:
 
 def _job(file: Saved) -> Job:
     path, pixels, info, raw = file
-    if info.transparent and extension(path) == ".png" and pixels.dtype == np.uint8 and pixels.shape[-1] == 4:
-        alpha = np.maximum(pixels[..., 3:].astype(np.uint32), 1)
-        straight = np.minimum((pixels[..., :3].astype(np.uint32) * 255 + alpha // 2) // alpha, 255).astype(np.uint8)
-        return path, np.concatenate([straight, pixels[..., 3:]], axis=-1), None, "data", False
+    decoded = not raw and info.encoding == "display"
+    if info.transparent and pixels.dtype == np.uint8 and pixels.shape[-1] == 4:
+        alpha = pixels[..., 3:]
+        whole = np.maximum(alpha.astype(np.uint32), 1)
+        straight = np.minimum((pixels[..., :3].astype(np.uint32) * 255 + whole // 2) // whole, 255).astype(np.uint8)
+        if extension(path) == ".png":
+            return path, np.concatenate([straight, alpha], axis=-1), None, "data", False
+        if decoded and extension(path) == ".exr":  # colours are decoded first, and multiplied by alpha as light
+            share = alpha / np.float32(255)
+            return path, np.concatenate([from_srgb(straight) * share, share], axis=-1), tuple("RGBA"), "linear", True
     if EXTENSIONS[extension(path)] in ("png", "jpeg"):
         return path, viewable_as(pixels, info), None, "data", False
     pixels = _numbers(pixels, info)
     shaped = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
-    decoded = not raw and info.encoding == "display"
     half = decoded or info.format in _HALF_FORMATS or pixels.dtype == np.float16
     return (
         path,

@@ -71,6 +71,9 @@ def test_png_files_have_straight_alpha(session: rg.Session, tmp_path: Path) -> N
     np.testing.assert_allclose(found[inside][:, :3], straight, atol=2.5 / 255)
     clear.save(tmp_path / "clear.exr")
     np.testing.assert_allclose(read(tmp_path / "clear.exr"), light, rtol=1e-3)
+    clear.save(tmp_path / "shown.exr", "image")
+    shown = np.clip(light[..., :3], 0, light[..., 3:])
+    np.testing.assert_allclose(read(tmp_path / "shown.exr")[..., :3], shown, atol=0.015)
     solid = drawn(session, tmp_path, "veil", "forward")
     solid.save(tmp_path / "solid.png")
     assert read(tmp_path / "solid.png").shape[-1] == 3
