@@ -144,7 +144,7 @@ def checked(document: Document, *, keep_going: bool = False, patch: bool = False
         raise InputError(validator.problems)
     scene = value.get("scene")
     if scene is not None and type(scene.data) is int and value.get("nodes") is value.get("extends") is None:
-        text = "this file is a scene, not a pipeline; render it with: rendergraph run forward --scene FILE"
+        text = "this file is a scene, not a pipeline; render it with: rendergraph run full --scene FILE"
         validator.report(scene, "RG013", text, key=True)
         raise InputError(validator.problems)
     root = validator.file(value, _PATCH if patch else PIPELINE, _HOLDS)

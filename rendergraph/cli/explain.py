@@ -208,7 +208,7 @@ def _scene_text(entry: Entry) -> str:
         section("Cameras", [(one["name"], one["line"]) for one in entry["cameras"]]),
         f"It uses the extensions {', '.join(entry['extensions'])}." if entry["extensions"] else "",
         *entry["added"],
-        f"`rendergraph run forward --scene {entry['name']}` renders it.",
+        f"`rendergraph run full --scene {entry['name']}` renders it.",
     )
 
 

@@ -127,7 +127,8 @@ class Validator:
         given = {name for name, child in value.items() if child.data is not None}
         if table.alternatives and len(given & table.alternatives.keys()) != 1:
             words = " or ".join(f"'{name}'" for name in table.alternatives)
-            self.report(value, self.codes.wrong, f"{what} needs either {words}", key=True)
+            either = "either " if len(table.alternatives) > 1 else ""
+            self.report(value, self.codes.wrong, f"{what} needs {either}{words}", key=True)
         for key in table.keys:
             if key.required and key.name not in given:
                 example = f"; add {key.example}" if key.example else ""

@@ -57,8 +57,11 @@ def describe_scene(name: str, path: Path, scene: Scene) -> dict[str, Any]:
 
     triangles = [mesh.indices.size // 3 for mesh in scene.meshes]
     added = [] if scene.cameras else ["It has no camera: one is added in front, above and to the right."]
-    if not scene.lights and (lights := complete(scene).lights):
-        added.append(f"It has no light: {_light(lights[0])} is added.")
+    whole = complete(scene)
+    if not scene.lights and whole.lights:
+        added.append(f"It has no light: {_light(whole.lights[0])} is added.")
+    if scene.environment is None and whole.environment is not None:
+        added.append("It has no environment: the studio is added; `--environment none` leaves it out.")
     return {
         "scene": scene.name,
         "name": name,

@@ -110,7 +110,7 @@ def _entry(source: str | Path | Document | Mapping[str, Any], limits: YamlLimits
             if (here := next(Path().glob(f"{source}.y*ml"), None)) is not None:
                 hint = f"; the file is named '{here}'"
             elif source in shipped_scenes():
-                hint = f"; it is a scene, render it with: rendergraph run forward --scene {source}"
+                hint = f"; it is a scene, render it with: rendergraph run full --scene {source}"
             raise InputError(Problem("RG015", f"there is no shipped pipeline '{source}'{hint}"))
         return read(shipped[source], None, limits, keep_going=True)
     path = Path(source)
@@ -120,7 +120,7 @@ def _entry(source: str | Path | Document | Mapping[str, Any], limits: YamlLimits
         from rendergraph.scene.mesh_files import MESHES  # likewise
 
         if path.suffix.lower() in MESHES:
-            way = f"rendergraph run forward --scene {shlex.quote(shown_file(path))}"
+            way = f"rendergraph run full --scene {shlex.quote(shown_file(path))}"
             text = f"this file is a scene, not a pipeline; render it with: {way}"
             raise InputError(Problem("RG013", text, Place(str(path))))
     try:

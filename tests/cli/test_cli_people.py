@@ -57,6 +57,7 @@ def test_a_file_is_explained_as_what_it_is(cli: Any, tmp_path: Path) -> None:
     assert shown.startswith("scene  (scene, 12 triangles)\n")
     assert "It has no camera" in shown
     assert "It has no light" in shown
+    assert "the studio is added; `--environment none` leaves it out" in shown
 
 
 def test_a_name_of_two_things_is_explained_as_both(cli: Any) -> None:

@@ -195,7 +195,7 @@ def test_a_folder_that_cannot_be_is_said_before_drawing(cli: Any, tmp_path: Path
     [
         (["run", "forwrd"], "RG015 there is no shipped pipeline 'forwrd'; did you mean 'forward'?"),
         (["run", "forward.yaml"], "RG011 there is no file 'forward.yaml'; did you mean 'forward', which is shipped?"),
-        (["run", "glass"], "'glass'; it is a scene, render it with: rendergraph run forward --scene glass"),
+        (["run", "glass"], "'glass'; it is a scene, render it with: rendergraph run full --scene glass"),
         (["run", "forward", "--scene", "bloom"], "RG015 there is no shipped scene 'bloom'; it is a pipeline"),
         (
             ["run", "forward", "--tap", "su.shadow_map=a.exr"],
@@ -239,7 +239,7 @@ def test_a_scene_is_no_pipeline_and_how_it_is_drawn_is_said(
 ) -> None:
     (tmp_path / name).write_text(text)
     result = cli("run", name)
-    said = f"RG013 this file is a scene, not a pipeline; render it with: rendergraph run forward --scene {drawn}"
+    said = f"RG013 this file is a scene, not a pipeline; render it with: rendergraph run full --scene {drawn}"
     assert (result.code, result.out) == (3, "")
     assert said in result.err
     assert len(result.err.splitlines()) in (1, 3)

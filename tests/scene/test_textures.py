@@ -165,7 +165,7 @@ def test_a_map_of_its_own_goes_before_the_texture(tmp_path: Path) -> None:
     [
         ("texture: {kind: brick}", "'kind': expected one of bricks, .*got 'brick'; did you mean 'bricks'"),
         ("texture: {kind: marble, mortar: 1}", "texture has no key 'mortar'"),
-        ("texture: {scale: 1}", "texture needs either 'kind'"),
+        ("texture: {scale: 1}", "texture needs 'kind'"),
         ("base_color_texture: {kind: tiles, resolution: 5}", "'resolution': expected"),
         ("texture: wood.png", "'texture': expected a mapping"),
     ],
