@@ -140,8 +140,8 @@ def mesh_trees(
     for record in packed.meshes:
         indices = packed.indices[record["first_index"] :][: record["count"]].reshape(-1, 3)
         shapes.append((packed.positions[record["base_vertex"] :][: record["vertices"]], indices))
-    needed = {*packed.object_mesh[~shared & ~packed.hidden].tolist(), len(scene.meshes)}
     numbers = np.flatnonzero(shared)
+    needed = {*packed.object_mesh[~shared & ~packed.hidden].tolist(), *([len(scene.meshes)] if len(numbers) else [])}
     shapes.append(_in_world(packed, shapes, numbers))
     missing = [number for number in needed if "tree" not in held[number]]
     if missing:

@@ -33,7 +33,7 @@ void scene_tangent_frame(
 
 #if defined(SCENE_LAYERS) && defined(HAS_LAYERS)
 // What the textures of the layers hold at a point, as `layer_texels` of `fragment_layers.glsl`. `normal` is that of the
-// geometry, with its tangent frame.
+// geometry, with its tangent frame, `c` the coordinates of textures; `flip_normal` turns normals of maps to the back.
 LayerTexels scene_layer_texels(
     int instance, SceneCoordinates c, MaterialData m, vec3 normal, vec3 tangent, vec3 bitangent, bool flip_normal) {
     LayerTexels layers = LayerTexels(vec2(1.0), vec4(1.0), vec2(1.0), vec2(1.0), normal);

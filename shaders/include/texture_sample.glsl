@@ -20,18 +20,20 @@ uint random_bits(ivec2 cell, int salt) {
     return h ^ (h >> 16u);
 }
 
-// Three random numbers from 0 to 1, likewise.
+// Three random numbers from 0 to 1 of a cell and a number `salt`.
 vec3 random3(ivec2 cell, int salt) {
     uint h = random_bits(cell, salt);
     return vec3(h & 0xffffu, h >> 16u, (h * 0x9e3779b1u) >> 16u) / 65536.0;
 }
 
+// A cell in the tile, whose `period` counts its cells, for a `cell` that may lie outside.
 ivec2 wrapped(ivec2 cell, ivec2 period) {
     return ivec2(cell.x - period.x * int(floor(float(cell.x) / float(period.x))),
                  cell.y - period.y * int(floor(float(cell.y) / float(period.y))));
 }
 
-// Gradient noise, about -1 to 1, that repeats after `period` cells of one unit (K. Perlin, "Improving Noise", 2002).
+// Gradient noise at `p`, about -1 to 1, that repeats after `period` cells of one unit (K. Perlin, "Improving Noise",
+// 2002). Another `salt` gives another pattern.
 float gradient_noise(vec2 p, ivec2 period, int salt) {
     ivec2 cell = ivec2(floor(p));
     vec2 f = p - vec2(cell);
@@ -46,7 +48,7 @@ float gradient_noise(vec2 p, ivec2 period, int salt) {
 }
 
 // The sum of octaves of gradient noise, about -1 to 1: `cells` of the first along u and v, each further one of twice as
-// many and `gain` times the height.
+// many and `gain` times the height. Another `salt` gives another pattern.
 float fractal_noise(vec2 uv, ivec2 cells, int octaves, float gain, int salt) {
     float sum = 0.0, weight = 1.0, total = 0.0;
     for (int i = 0; i < octaves; ++i) {
@@ -65,8 +67,8 @@ struct CellularNoise {
     vec2 offset;    // from that point, in cells
 };
 
-// Where a point is in relation to random ones, of which there is one in each of `cells`; `spread` 0 puts them on a grid
-// (S. Worley, "A Cellular Texture Basis Function", 1996).
+// Where a point is in relation to random ones, of which there is one in each of `cells`. `spread` 0 puts them on a grid,
+// another `salt` elsewhere (S. Worley, "A Cellular Texture Basis Function", 1996).
 CellularNoise cellular_noise(vec2 uv, ivec2 cells, float spread, int salt) {
     vec2 p = uv * vec2(cells);
     ivec2 home = ivec2(floor(p));
@@ -83,8 +85,8 @@ CellularNoise cellular_noise(vec2 uv, ivec2 cells, float spread, int salt) {
     return found;
 }
 
-// Distance to the border of the region of the nearest point, in cells (I. Quilez, "Voronoi edges", 2012); the other
-// arguments are those of `cellular_noise`.
+// Distance to the border of the region of the nearest point, in cells (I. Quilez, "Voronoi edges", 2012). `found` is
+// what `cellular_noise` returned for the same point, `cells`, `spread` and `salt`.
 float cellular_edge(CellularNoise found, vec2 uv, ivec2 cells, float spread, int salt) {
     vec2 p = uv * vec2(cells);
     float edge = 1e9;
@@ -99,7 +101,7 @@ float cellular_edge(CellularNoise found, vec2 uv, ivec2 cells, float spread, int
     return edge;
 }
 
-// A colour made lighter or darker by the factor `exp2(by)`, and within what albedo can be.
+// A `color` made lighter or darker by the factor `exp2(by)`, and within what albedo can be.
 vec3 shaded(vec3 color, float by) {
     return clamp(color * exp2(by), 0.0, 0.95);
 }

@@ -146,7 +146,7 @@ bool trace(
     return hit.instance >= 0;
 }
 
-// The same without anything that lets light pass.
+// The same without anything that lets light pass; `any` ends the search at the first hit.
 bool trace(
     vec3 origin, vec3 direction, float nearest, float farthest, int wanted, int rejected, bool any, out Hit hit) {
     bool ends;

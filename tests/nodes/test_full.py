@@ -68,7 +68,7 @@ def test_indirect_light_is_seen_through_what_is_clear(session: rg.Session, tmp_p
         (tmp_path / "scene.yaml").write_text(CLEAR % hidden)
         pipeline = rg.load("full", scene=tmp_path / "scene.yaml", size=SIZE, sets=["ao.enabled=false"])
         drawn.append(np.asarray(session.render(pipeline, outputs=["radiance"])["radiance"], np.float64)[..., :3])
-    np.testing.assert_allclose(*drawn, rtol=0.01, atol=2e-3)
+    np.testing.assert_allclose(drawn[0], drawn[1], rtol=0.01, atol=2e-3)
     pipeline = rg.load("full", scene=tmp_path / "scene.yaml", size=SIZE, sets=["ao.enabled=false", "gi.enabled=false"])
     without = np.asarray(session.render(pipeline, outputs=["radiance"])["radiance"], np.float64)[..., :3]
     assert np.abs(drawn[0] - without).max() > 0.05

@@ -246,7 +246,7 @@ def check(gl: Any, path: Path, moments: npt.ArrayLike, clip: int = 0) -> None:
                 for name, (buffer, _) in made._streams.items()
             }
             again = GpuScene(gl.device, now, pack.pack(now), lambda *_: white, lambda _: white)
-            assert made.tree().read() == again.tree().read()
+            assert made.tree()[0].read() == again.tree()[0].read()
             again.release(gl.cache.programs)
             data = np.frombuffer(made.data.buffers["scene_vertex_block"].read(), np.float32).reshape(-1, width)
             assert (data[:, :3] == streams["in_position"]).all()

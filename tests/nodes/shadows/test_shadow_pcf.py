@@ -169,7 +169,7 @@ def test_both_forms_give_the_same_picture(session: rg.Session, scene: str) -> No
 def test_lights_that_are_not_named_cast_no_shadow(gl: Any, shared: Path) -> None:
     scene = shared / "reference" / "b1_direct" / "point_spot_persp" / "scene.glb"
     with_map = rg.load("forward", scene=scene, size=(80, 60)).link().graph
-    assert with_map.lights[1].type == "spot"
+    assert with_map.facts.lights[1].type == "spot"
     (info,) = [info for end, info in with_map.textures.items() if str(end) == "sun.shadow_map"]
     assert info.lights == (1,)
 
