@@ -172,7 +172,8 @@ def _read(
 ) -> tuple[Expanded, list[Target]]:
     """Do everything that needs no GL device: return the expanded pipeline, and the output files by their names."""
     from rendergraph import images
-    from rendergraph.images.video import is_film
+    from rendergraph.images.saving import extension
+    from rendergraph.images.video import ENDINGS, is_film
     from rendergraph.session import stages
     from rendergraph.session.films import standstill_warning
     from rendergraph.session.outputs import every_port, figures
@@ -194,6 +195,8 @@ def _read(
     pictures = [
         t.path.with_suffix(".png") if is_film(t.path) else t.path for t in outputs
     ]  # a film consists of pictures
+    for path in pictures:
+        extension(path, ENDINGS)
     named = [
         t if t.name else replace(t, name=images.output_for(path, known))
         for t, path in zip(outputs, pictures, strict=True)
@@ -204,28 +207,34 @@ def _read(
     if tap_all is not None:
         _make_folder(tap_all)
     _check(targets, expanded, map(Path, files))
-    warnings.say(standstill_warning(expanded))
+    warnings.say(standstill_warning(expanded, film=any(is_film(target.path) for target in targets)))
     return (_resumed(expanded, targets) if resume else expanded), targets
 
 
 def _resumed(expanded: Expanded, targets: Sequence[Target]) -> Expanded:
     """Return the same from the first frame on of which a file is missing."""
     from rendergraph.images import is_numbered, numbered
-    from rendergraph.session.picture_metadata import metadata, pipeline_metadata
+    from rendergraph.session.picture_metadata import frame_metadata, metadata, pipeline_metadata, turntable_metadata
 
     if single := next((target for target in targets if not is_numbered(target.path)), None):
         text = f"--resume continues numbered frames, and '{single.path}' has no `####`; leave one of them out"
         raise UsageError(Problem("RG500", text))
-    frames = expanded.options.frames
-    own = pipeline_metadata(expanded.linked)["rendergraph:pipeline"]
+    options, frames = expanded.options, expanded.options.frames
+    film = pipeline_metadata(expanded.linked) | turntable_metadata(expanded)
+    # Where a turntable's camera is in a frame follows from its circle.
+    free = {"versions", "device", *(["camera"] if options.turntable else [])}
     for number in frames:
         paths = [numbered(target.path, number) for target in targets]
         if not all(path.is_file() for path in paths):
             frames = frames[frames.index(number) :]
             break
-        for path in paths:
-            if path.suffix.lower() in (".png", ".exr") and metadata(path)["pipeline"] != own:
-                text = "is a picture of another pipeline; without --resume all frames are rendered again"
+        made = film | frame_metadata(number, options.fps, options.subframes)
+        own = {name.removeprefix("rendergraph:"): text for name, text in made.items()}
+        for path in (path for path in paths if path.suffix.lower() in (".png", ".exr")):
+            found = metadata(path)
+            other = [name for name in (own.keys() | found) - free if own.get(name) != found.get(name)]
+            if other:
+                text = f"differs from this film in its {max(other)}; without --resume all frames are rendered again"
                 raise InputError(Problem("RG512", text, Place(str(path))))
     else:
         frames = frames[-1:]  # everything is there; the report is that of the last one
@@ -323,7 +332,7 @@ def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path])
     """Refuse output files that cannot be written, before anything is rendered; `files` are those that were read."""
     from rendergraph import images
     from rendergraph.images.saving import extension
-    from rendergraph.images.video import check_film, is_film
+    from rendergraph.images.video import ENDINGS, check_film, is_film
 
     linked, numbers = expanded.linked, expanded.options.frames
     for name, port in expanded.requests.items():
@@ -338,7 +347,7 @@ def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path])
         if is_film(target.path):
             check_film(target.path)
         else:
-            extension(target.path)
+            extension(target.path, ENDINGS)
         place = os.path.realpath(target.path)
         if place in seen:
             raise UsageError(Problem("RG502", f"two outputs have the same file '{target.path}'; name two files"))

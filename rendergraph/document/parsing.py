@@ -150,7 +150,7 @@ class _Builder(Struct, eq=False):
         elif name is BROKEN:
             pass
         elif isinstance(name, bool) or not isinstance(name, str | int | float) or name != name:
-            self.say("RG009", f"a key must be text or a number, got {kind_of(name)}", mark)
+            self.say("RG009", f"a key must be text or a number, got {kind_of(name) if name == name else '.nan'}", mark)
         elif name in into:
             first = into[name].key_place.line
             self.say("RG002", f"duplicate key '{shown(name)}', first in line {first}; remove one", mark)

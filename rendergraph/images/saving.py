@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
@@ -129,13 +129,15 @@ def _numbers(pixels: Pixels, info: TexelInfo) -> Pixels:
     return pixels.astype(np.int64) if known and known.family in ("uint", "int") else pixels
 
 
-def extension(path: Path) -> str:
-    """Return a file's extension in lower case, which must be that of a picture."""
+def extension(path: Path, others: Iterable[str] = ()) -> str:
+    """Return a file's extension in lower case, which must be that of a picture; a message names `others` as well."""
     suffix = path.suffix.lower()
     if suffix in EXTENSIONS:
         return suffix
     what = f"'{path.suffix}' files are not written" if suffix else f"'{path}' has no extension to choose the format by"
-    hint = suggestion(suffix, EXTENSIONS) if suffix else f"; name it '{path}.png'"
+    known = ", ".join(sorted((*EXTENSIONS, *others)))
+    near = suggestion(suffix, EXTENSIONS, most=0) or f"; available: {known}"
+    hint = near if suffix else f"; name it '{path}.png'"
     raise UsageError(Problem("RG501", f"{what}{hint}"))
 
 

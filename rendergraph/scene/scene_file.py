@@ -234,7 +234,7 @@ class _Reader:
     def _check_name(self, entry: Value, key: str, known: Iterable[str], section: str) -> None:
         value = entry.get(key)
         if value is not None and value.data is not None:
-            self._check_text(value, key, known, section)
+            self._check_text(value, section.removesuffix("s"), known, section)
 
     def _check_text(self, value: Value, what: str, known: Iterable[str], section: str) -> None:
         if str(value.data) not in known:
@@ -625,7 +625,9 @@ class _Reader:
             return scene_keys.NODE_VALUE
         known = names.get(section, ())
         moving: dict[str, Key] = {}
-        if section not in scene_keys.SECTIONS:
+        if section == "nodes":
+            text = f"keyframes: '{shown(path)}' names no parameter of a node; write nodes.ID.PARAM"
+        elif section not in scene_keys.SECTIONS:
             hint = suggestion(section, (*scene_keys.SECTIONS, "nodes"))
             text = f"keyframes: there is no section '{shown(section)}'{hint}"
         elif section != "environment" and name not in known:

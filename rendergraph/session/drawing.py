@@ -23,7 +23,7 @@ from rendergraph.scene.model import Camera, Scene
 from rendergraph.session.driven import Driven
 from rendergraph.session.frame import Frame, OutputInfo
 from rendergraph.session.gpu import Gpu
-from rendergraph.session.picture_metadata import frame_metadata, pipeline_metadata
+from rendergraph.session.picture_metadata import frame_metadata, pipeline_metadata, turntable_metadata
 from rendergraph.session.values import Expanded, OutputRequest
 from rendergraph.textures import FORMATS, Semantic, TextureDesc
 from rendergraph.version import __version__
@@ -187,7 +187,7 @@ class Drawing(Struct, eq=False, dict=True):
             return {}
         from rendergraph.scene.camera_words import camera_words  # few cameras are put in words
 
-        return {"rendergraph:camera": camera_words(self.camera)}
+        return {**turntable_metadata(self.expanded), "rendergraph:camera": camera_words(self.camera)}
 
     def _frame_warnings(self) -> Iterator[Problem]:
         """Yield warnings about frames that show less than was asked for."""

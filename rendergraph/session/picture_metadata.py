@@ -20,7 +20,7 @@ from rendergraph.stamps import record_read
 
 if TYPE_CHECKING:
     from rendergraph.document import Document, YamlLimits
-    from rendergraph.session.values import Linked
+    from rendergraph.session.values import Expanded, Linked
 
 PICTURES = frozenset({".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga"})
 """Extensions of pictures, which distinguish them from pipelines."""
@@ -43,7 +43,8 @@ def pipeline_metadata(linked: Linked) -> dict[str, str]:
         **selection.view,
     }
     if selection.environment is not None:
-        fields["environment"] = shown_file(selection.environment.absolute())
+        name = selection.environment
+        fields["environment"] = "none" if name == Path("none") else shown_file(name.absolute())
     return {f"rendergraph:{name}": text for name, text in fields.items() if text is not None}
 
 
@@ -51,6 +52,14 @@ def frame_metadata(frame: int, fps: float, subframes: int = 1) -> dict[str, str]
     """Return the metadata of one frame; the first frame has none unless it is a mean of moments."""
     found = {"rendergraph:subframes": str(subframes)} if subframes > 1 else {}
     return found | ({"rendergraph:frame": str(frame), "rendergraph:fps": f"{fps:g}"} if frame > 1 or found else {})
+
+
+def turntable_metadata(expanded: Expanded) -> dict[str, str]:
+    """Return the metadata of a turntable: its frames, and the camera that it began with, if one was chosen."""
+    turned, begun = expanded.options.turntable, expanded.linked.selection.camera
+    if turned is None:
+        return {}
+    return {"rendergraph:turntable": f"{turned[0]}-{turned[-1]}" + (f" from {begun}" if begun else "")}
 
 
 def _inside(folder: Path) -> str | None:

@@ -70,7 +70,9 @@ def resolve(selection: Selection, catalog: Catalog | None = None, document: Docu
         source, frames, fps = picture.document, range(picture.frame, picture.frame + 1), picture.fps
         subframes = picture.subframes
         view = {name: value for name, value in picture.view.items() if name not in selection.view}
-        if "environment" in view:  # it must lie below an asset root: the user has not typed it
+        if view.get("environment", Path("none")) != Path(
+            "none"
+        ):  # it must lie below an asset root: the user has not typed it
             Roots.of_file(Path("x"), selection.asset_roots).check(view["environment"], Place(str(selection.source)))
         selection = replace(selection, **view)
     resolve_with = partial(

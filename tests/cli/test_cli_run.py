@@ -89,7 +89,11 @@ def test_frames_are_numbered(cli: Any, fake: Any, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
-        (["-o", "a.bmp"], 2, "RG501 '.bmp' files are not written; available: .exr, .hdr, .jpeg, .jpg, .png"),
+        (
+            ["-o", "a.bmp"],
+            2,
+            "RG501 '.bmp' files are not written; available: .exr, .gif, .hdr, .jpeg, .jpg, .mp4, .png, .webp",
+        ),
         (["-o", "a"], 2, "RG501 'a' has no extension to choose the format by; name it 'a.png'"),
         (["-o", "a.png", "--tap", "n.p=./a.png"], 2, "RG502 two outputs have the same file 'a.png'; name two files"),
         (["-o", "a.png", "-o", "link/a.png"], 2, "RG502 two outputs have the same file 'link/a.png'"),

@@ -140,7 +140,7 @@ def test_a_camera_follows_a_skinned_animal() -> None:
         "objects.b.at: {0: [0, 0, 0], easing: smooth}": "'easing' is not a time in seconds, `ease` or `slerp`",
         "nodes.bloom.intensity: {0: 1, 1: [1, 2]}": "keyframes of 'nodes.bloom.intensity' are of different lengths",
         "nodes.bloom.intensity: {0: high}": "'value': expected a number",
-        "nodes.bloom: {0: 1}": "there is no section 'nodes'",
+        "nodes.bloom: {0: 1}": "'nodes.bloom' names no parameter of a node; write nodes.ID.PARAM",
         "objects.b.at: {0: [.nan, 0, 0]}": "expected a list of 3 numbers",
         "objects.b.at: {.nan: [0, 0, 0]}": "RG321 keyframes of 'objects.b.at'",
     }.items(),
@@ -154,7 +154,7 @@ def test_mistakes_in_keyframes(tmp_path: Path, text: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("camera", "message"),
     {
-        "follow: bx": "there is no follow 'bx'; did you mean 'box'?",
+        "follow: bx": "there is no object 'bx'; did you mean 'box'?",
         "follow: box, target: [0, 0, 0]": "has both 'follow' and 'target'; choose one",
         "follow: box, eye: [-2, 0.5, 0]": "eye and target coincide",
     }.items(),

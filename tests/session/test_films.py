@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import re
 from pathlib import Path
 from typing import Any
 
@@ -105,11 +106,21 @@ def test_a_frame_of_a_turntable_can_be_rendered_again(gl: rg.Session, scene: Pat
     assert np.abs(again["image"].astype(int) - frame["image"]).max() <= 1
 
 
+def test_a_picture_without_environment_can_be_rendered_again() -> None:
+    words = ["--size", "16x9", "-q"]
+    assert main(["run", "forward", "--environment", "none", *words, "-o", "bare.png"]) == 0
+    assert main(["run", "bare.png", "-q", "-o", "again.png"]) == 0
+    np.testing.assert_array_equal(read("again.png"), read("bare.png"))
+
+
 def test_a_film_in_which_nothing_moves_says_so(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene.write_text(MOVING.split("keyframes")[0])
     words = ["run", "forward", "--scene", str(scene), "--size", "16x9", "--frames", "1-3", "-o", "a.##.png"]
     assert main(words) == 0
     assert "RG629 nothing in the scene moves during 3 frames; --turntable" in capsys.readouterr().err
+    pytest.importorskip("imageio_ffmpeg")
+    assert main([*words[:-4], "-o", "a.gif"]) == 0
+    assert "RG629 nothing in the scene moves, so the film is one frame; --turntable" in capsys.readouterr().err
     assert main([*words, "--turntable"]) == 0
     assert "RG629" not in capsys.readouterr().err
 
@@ -126,9 +137,46 @@ def test_numbered_frames_go_on_where_they_were_interrupted(scene: Path, capsys: 
         np.testing.assert_array_equal(read(f"part.{number:02d}.png"), read(f"whole.{number:02d}.png"))
     assert main([*words, "-o", "part.##.png", "--resume"]) == 0
     assert main([*words, "-o", "part.##.png", "--resume", "-s", "display.exposure=1"]) == 3
-    assert "part.01.png: RG512 is a picture of another pipeline" in capsys.readouterr().err
+    assert "part.01.png: RG512 differs from this film in its pipeline; without" in capsys.readouterr().err
+    assert main([*words, "-o", "part.##.png", "--resume", "--camera", "eye=1,1,4", "--fps", "10"]) == 3
+    assert "part.01.png: RG512 differs from this film in its camera;" in capsys.readouterr().err
+    assert main([*words, "-o", "part.##.png", "--resume", "--fps", "10"]) == 3
+    assert "part.02.png: RG512 differs from this film in its fps;" in capsys.readouterr().err
+    assert main([*words, "-o", "part.##.png", "--resume", "--subframes", "2"]) == 3
+    assert "RG512 differs from this film in its subframes;" in capsys.readouterr().err
+    assert main([*words, "-o", "part.##.png", "--resume", "--turntable"]) == 3
+    assert "RG512 differs from this film in its turntable;" in capsys.readouterr().err
     assert main([*words, "-o", "a.gif", "--resume"]) == 2
     assert "--resume continues numbered frames, and 'a.gif' has no `####`" in capsys.readouterr().err
+
+
+def test_turntables_go_on_only_on_the_same_circle(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["run", "forward", "--scene", str(scene), "--size", "16x9", "--turntable", "-o", "a.##.png", "--frames"]
+    assert main([*words, "1-3"]) == 0
+    Path("a.03.png").unlink()
+    capsys.readouterr()
+    assert main([*words, "1-3", "--resume"]) == 0
+    assert capsys.readouterr().out.split() == ["a.03.png"]
+    assert main([*words, "1-4", "--resume"]) == 3
+    assert "a.01.png: RG512 differs from this film in its turntable;" in capsys.readouterr().err
+    assert main([*words, "1-3", "--resume", "--camera", "eye=1,1,4"]) == 3
+    assert "a.01.png: RG512 differs from this film in its turntable;" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"seconds": -1}, "seconds: expected a number above 0, got -1"),
+        ({"seconds": "2"}, "seconds: expected a number above 0, got '2'"),
+        ({"fps": float("nan")}, "fps: expected a number above 0, got nan"),
+        ({"frames": range(1, 9, 2)}, "frames: expected consecutive numbers"),
+        ({"frames": "clap"}, "or 'clip', got 'clap'"),
+        ({"frames": 3}, "or 'clip', got 3"),
+    ],
+)
+def test_impossible_lengths_of_films(scene: Path, options: dict[str, Any], text: str) -> None:
+    with pytest.raises(UsageError, match=re.escape(text)):
+        rg.load("forward", scene=scene, size=SIZE).film("a.gif", **options)
 
 
 def test_wrong_films(scene: Path) -> None:
