@@ -106,6 +106,7 @@ def test_a_frame_of_a_turntable_can_be_rendered_again(gl: rg.Session, scene: Pat
     assert np.abs(again["image"].astype(int) - frame["image"]).max() <= 1
 
 
+@pytest.mark.usefixtures("scene")  # which changes into its folder
 def test_a_picture_without_environment_can_be_rendered_again() -> None:
     words = ["--size", "16x9", "-q"]
     assert main(["run", "forward", "--environment", "none", *words, "-o", "bare.png"]) == 0
