@@ -7,12 +7,17 @@ import math
 import re
 from typing import Any
 
+from msgspec.structs import replace
+
 from rendergraph.document import parse
 from rendergraph.errors import InputError, Option, Place, Problem
 from rendergraph.keys import Key, Validator, plain
 from rendergraph.scene import scene_keys, scene_values
 from rendergraph.scene.geometry import vec3
 from rendergraph.scene.model import Camera
+
+_WORDS = replace(scene_keys.CAMERA, keys=tuple(key for key in scene_keys.CAMERA.keys if key.name != "follow"))
+"""A camera in words always has a target."""
 
 
 def keys_of(text: str) -> dict[str, Any]:
@@ -25,13 +30,13 @@ def keys_of(text: str) -> dict[str, Any]:
     validator = Validator(scene_keys.CODES)
     try:
         root = parse("".join(f"{json.dumps(name)}: {value}\n" for name, value in keys), "--camera").root
-        valid = validator.value(root, Key("camera", scene_keys.CAMERA, ""))
+        valid = validator.value(root, Key("camera", _WORDS, ""))
         if validator.problems or valid is None:
             raise InputError(validator.problems)
     except InputError as error:
         here = Place(Option("--camera", text))
         raise InputError([problem.relocate(here) for problem in error.problems]) from None
-    found: dict[str, Any] = plain(valid, scene_keys.CAMERA)
+    found: dict[str, Any] = plain(valid, _WORDS)
     return found
 
 
