@@ -84,7 +84,7 @@ class Tonemap(Node):
         Any,
         kind="texture3d",
         format="rgba32f",
-        size=lambda node, facts: (_look_side(node, facts),) * 2,
+        size=lambda node, facts: (_look_side(node, facts), _look_side(node, facts)),
         layers=_look_side,
         kept=True,
         doc="Colours of a look.",

@@ -15,12 +15,14 @@
 #define HAS_LAYERS
 #endif
 #if defined(PHYSICAL_LAYERS) \
-    && ((defined(FRAGMENT_LAYERS) && defined(HAS_IRIDESCENCE)) || (defined(SCENE_LAYERS) && defined(SCENE_ANY_IRIDESCENCE)))
+    && ((defined(FRAGMENT_LAYERS) && defined(HAS_IRIDESCENCE)) \
+        || (defined(SCENE_LAYERS) && defined(SCENE_ANY_IRIDESCENCE)))
 #define IRIDESCENCE_LAYER
 #define HAS_LAYERS
 #endif
 #if defined(PHYSICAL_LAYERS) \
-    && ((defined(FRAGMENT_LAYERS) && defined(HAS_TRANSMISSION)) || (defined(SCENE_LAYERS) && defined(SCENE_ANY_TRANSMISSION)))
+    && ((defined(FRAGMENT_LAYERS) && defined(HAS_TRANSMISSION)) \
+        || (defined(SCENE_LAYERS) && defined(SCENE_ANY_TRANSMISSION)))
 #define TRANSMISSION_LAYER
 #define HAS_LAYERS
 #endif

@@ -67,8 +67,8 @@ struct CellularNoise {
     vec2 offset;    // from that point, in cells
 };
 
-// Where a point is in relation to random ones, of which there is one in each of `cells`. `spread` 0 puts them on a grid,
-// another `salt` elsewhere (S. Worley, "A Cellular Texture Basis Function", 1996).
+// Where a point is in relation to random ones, of which there is one in each of `cells`. `spread` 0 puts them on a
+// grid, another `salt` elsewhere (S. Worley, "A Cellular Texture Basis Function", 1996).
 CellularNoise cellular_noise(vec2 uv, ivec2 cells, float spread, int salt) {
     vec2 p = uv * vec2(cells);
     ivec2 home = ivec2(floor(p));

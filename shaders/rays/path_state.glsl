@@ -69,7 +69,8 @@ void find_emission(inout Path path, Surface s, Hit hit, vec3 front, bool emits) 
     if (is_unlit) {
         path.radiance += path.throughput * s.base_color;
     } else if (emits) {
-        float weight = path.vertex > 0 ? emission_weight(hit, front, path.direction, path.density, path.chances.z) : 1.0;
+        bool is_camera = path.vertex == 0;
+        float weight = is_camera ? 1.0 : emission_weight(hit, front, path.direction, path.density, path.chances.z);
         path.radiance += path.throughput * s.emissive * weight;
     }
 #endif
