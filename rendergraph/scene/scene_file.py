@@ -633,6 +633,8 @@ class _Reader:
         elif section != "environment" and name not in known:
             hint = suggestion(name, known) or f"; there are no {section}"
             text = f"keyframes: there is no '{shown(name)}' under {section}{hint}"
+        elif section == "cameras" and key == "target" and "follow" in self.recipe.get((section, name), {}):
+            text = f"keyframes: camera '{shown(name)}' follows an object, so its target cannot move by itself"
         else:
             moving = scene_keys.moving(self.sections[section])
             text = f"keyframes: {section} have no moving key '{shown(key)}'{suggestion(key, moving)}"

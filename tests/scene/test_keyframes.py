@@ -157,6 +157,7 @@ def test_mistakes_in_keyframes(tmp_path: Path, text: str, message: str) -> None:
         "follow: bx": "there is no object 'bx'; did you mean 'box'?",
         "follow: box, target: [0, 0, 0]": "has both 'follow' and 'target'; choose one",
         "follow: box, eye: [-2, 0.5, 0]": "eye and target coincide",
+        "follow: box}}\nkeyframes: {cameras.m.target: {0: [1, 1, 1]": "4:13: RG322 keyframes: camera 'm' follows an object",
     }.items(),
 )
 def test_mistakes_in_following(tmp_path: Path, camera: str, message: str) -> None:
