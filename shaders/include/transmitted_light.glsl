@@ -7,8 +7,8 @@
 
 uniform sampler2D behind;
 
-// Radiance and coverage of the picture at texture coordinates `uv`, blurred to a `level`. Cubic B-splines of four
-// linear samples hide the texels of coarse levels (C. Sigg and M. Hadwiger, "Fast Third-Order Texture Filtering", 2005).
+// Radiance and coverage of the picture at coordinates `uv`, blurred to a `level`. Cubic B-splines of four samples
+// hide texels of coarse levels (C. Sigg and M. Hadwiger, "Fast Third-Order Texture Filtering", 2005).
 vec4 blurred_picture(vec2 uv, float level) {
     vec4 sharp = textureLod(behind, uv, 0.0);
     if (level <= 0.0) return sharp;
