@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rendergraph.api import Any, DisplayColor, Input, Internal, Node, Output, Steps, param
+from rendergraph.api import Any, DisplayColor, Input, Internal, Node, Output, Steps, define, param
 
 MAX_REACH = 32
 """The largest number of texels that an edge is searched to each side."""
@@ -18,7 +18,7 @@ class SMAA(Node):
     """
 
     source = Input(DisplayColor, doc="The finished picture, display-referred.")
-    color = Output(like="source", doc="The picture with smooth edges; alpha unchanged.")
+    color = Output(like="source", doc="The picture with smooth edges.")
     area_table = Internal(Any, format="rg16", size=(9 * (MAX_REACH + 1), MAX_REACH + 1), kept=True)
     edges = Internal(format="rg8", size="source")
     weights = Internal(format="rgba8", size="source")
@@ -28,6 +28,8 @@ class SMAA(Node):
         default=2.0, min=1, max=100, doc="Edges next to one that is stronger by this factor are dropped."
     )
     reach: int = param(default=16, min=1, max=MAX_REACH, unit="texels", doc="How far an edge is searched to each side.")
+
+    transparent: bool = define(default=False, doc="Smooth alpha, too, by which colours are multiplied.")
 
     def record(self, steps: Steps) -> None:
         """Record the table, edge detection, weights and blending."""

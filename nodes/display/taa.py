@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rendergraph.api import Depth, DisplayColor, History, Input, Node, Output, Steps, Velocity, param
+from rendergraph.api import Depth, DisplayColor, History, Input, Node, Output, Steps, Velocity, param, structural
 
 _FIRST_INDEX = 1897
 """The start of the sequence. Of the first 2,500 indices, it is the one for which the first 8 and 16 frames, together
@@ -26,8 +26,9 @@ class Taa(Node):
     source = Input(DisplayColor, doc="The finished picture, display-referred.")
     depth = Input(Depth, doc="Window depth; edges move with the nearer surface.")
     velocity = Input(Velocity, optional=True, doc="Motion vectors. Unconnected: only the camera moves.")
-    color = Output(like="source", doc="The picture with smooth edges; alpha of this frame.")
+    color = Output(like="source", doc="The picture with smooth edges; alpha of this frame, or its mean.")
     history = History(format="rgba16f")
+    coverage = History(format="r16f")
 
     frames: int = param(default=8, min=1, max=256, doc="Frames that are averaged while anything moves.")
     frames_at_rest: int = param(default=64, min=1, max=1024, doc="Frames that are averaged while nothing moves.")
@@ -37,6 +38,7 @@ class Taa(Node):
         max=16,
         doc="How far the history may differ from the mean of the neighbourhood, in standard deviations.",
     )
+    transparent: bool = structural(default=False, doc="Average alpha, too, by which colours are multiplied.")
 
     def record(self, steps: Steps) -> None:
         """Record one pass over the picture."""
@@ -44,7 +46,11 @@ class Taa(Node):
         if steps.connected(self.velocity):
             reads["velocity"] = self.velocity
         reads["previous_history"] = self.history.previous.sampled("linear")
-        steps.fullscreen("taa.frag", out={"color": self.color, "history": self.history}, **reads)
+        out: dict[str, Any] = {"color": self.color, "history": self.history}
+        if self.transparent:
+            out["coverage"] = self.coverage
+            reads["previous_coverage"] = self.coverage.previous.sampled("linear")
+        steps.fullscreen("taa.frag", out=out, defines={"TRANSPARENT": int(self.transparent)}, **reads)
 
     def camera_jitter(self, frame: int) -> tuple[float, float]:
         """Return the sample position of a frame: the centre in the first, then a Halton sequence."""

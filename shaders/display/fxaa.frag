@@ -16,6 +16,7 @@ params:
   darkest: {default: 0.03125, min: 0, max: 1, doc: "Least difference of luma at an edge in dark regions."}
   softness: {default: 0.75, min: 0, max: 1, doc: "Blending of single pixels that stand out with their surroundings."}
   reach: {default: 12, min: 1, max: 64, unit: texels, doc: How far an edge is searched to each side.}
+  transparent: {role: define, default: false, doc: "See edges in alpha, too, by which colours are multiplied."}
 ---*/
 uniform sampler2D source;
 uniform float contrast;
@@ -24,18 +25,21 @@ uniform float softness;
 uniform int reach;
 out vec4 color;
 
-float luma(vec3 c) {
-    return dot(c, vec3(0.299, 0.587, 0.114));  // of encoded colour (ITU-R BT.601)
+float luma(vec4 c) {
+#if TRANSPARENT
+    c.rgb += c.a - 1.0;  // over what is darker than black, so that black surfaces have edges, too
+#endif
+    return dot(c.rgb, vec3(0.299, 0.587, 0.114));  // of encoded colour (ITU-R BT.601)
 }
 
 float luma_at(ivec2 texel) {
-    return luma(texelFetch(source, clamp(texel, ivec2(0), textureSize(source, 0) - 1), 0).rgb);
+    return luma(texelFetch(source, clamp(texel, ivec2(0), textureSize(source, 0) - 1), 0));
 }
 
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
     color = texelFetch(source, texel, 0);
-    float center = luma(color.rgb);
+    float center = luma(color);
     float up = luma_at(texel + ivec2(0, 1)), down = luma_at(texel - ivec2(0, 1));
     float right = luma_at(texel + ivec2(1, 0)), left = luma_at(texel - ivec2(1, 0));
     float maximum = max(center, max(max(up, down), max(left, right)));

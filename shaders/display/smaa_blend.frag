@@ -20,8 +20,15 @@ void main() {
     if (pair.x + pair.y == 0.0) return;
     ivec2 step = is_vertical ? ivec2(0, 1) : ivec2(1, 0);
     ivec2 last = textureSize(source, 0) - 1;
+#if TRANSPARENT
+    vec4 previous = display_to_light(texelFetch(source, max(texel - step, ivec2(0)), 0));
+    vec4 next = display_to_light(texelFetch(source, min(texel + step, last), 0));
+    vec4 center = display_to_light(color);
+    color = light_to_display(center + pair.x * (previous - center) + pair.y * (next - center));
+#else
     vec3 previous = srgb_to_linear(texelFetch(source, max(texel - step, ivec2(0)), 0).rgb);
     vec3 next = srgb_to_linear(texelFetch(source, min(texel + step, last), 0).rgb);
     vec3 center = srgb_to_linear(color.rgb);
     color.rgb = linear_to_srgb(center + pair.x * (previous - center) + pair.y * (next - center));
+#endif
 }

@@ -7,7 +7,11 @@ out vec2 edges;  // 1 on the left, below
 
 float luma_at(ivec2 texel) {
     texel = clamp(texel, ivec2(0), textureSize(source, 0) - 1);
-    return dot(texelFetch(source, texel, 0).rgb, vec3(0.2126, 0.7152, 0.0722));
+    vec4 color = texelFetch(source, texel, 0);
+#if TRANSPARENT
+    color.rgb += color.a - 1.0;  // over what is darker than black, so that black surfaces have edges, too
+#endif
+    return dot(color.rgb, vec3(0.2126, 0.7152, 0.0722));
 }
 
 void main() {

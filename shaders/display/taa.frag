@@ -16,6 +16,10 @@ uniform int frames_at_rest;
 uniform float tolerance;
 out vec4 color;
 out vec4 history;  // the mean, display-linear; in alpha the number of frames in it
+#if TRANSPARENT
+uniform sampler2D previous_coverage;
+out float coverage;  // mean of alpha
+#endif
 
 vec3 rgb_to_ycocg(vec3 c) {
     return vec3(dot(c, vec3(0.25, 0.5, 0.25)), dot(c, vec3(0.5, 0.0, -0.5)), dot(c, vec3(-0.25, 0.5, -0.25)));
@@ -27,7 +31,11 @@ vec3 ycocg_to_rgb(vec3 c) {
 
 vec3 source_ycocg(ivec2 texel) {
     texel = clamp(texel, ivec2(0), textureSize(source, 0) - 1);
+#if TRANSPARENT
+    return rgb_to_ycocg(display_to_light(texelFetch(source, texel, 0)).rgb);
+#else
     return rgb_to_ycocg(srgb_to_linear(texelFetch(source, texel, 0).rgb));
+#endif
 }
 
 float depth_at(ivec2 texel) {
@@ -91,6 +99,20 @@ vec3 clip_to_neighborhood(vec3 value, ivec2 texel) {
     return mean + (value - mean) * scale;
 }
 
+#if TRANSPARENT
+// The mean of alpha at `uv`, within what alpha is in the 3×3 neighbourhood of a texel.
+float moved_coverage(vec2 uv, ivec2 texel) {
+    float least = 1.0, most = 0.0;
+    for (int i = 0; i < 9; ++i) {
+        ivec2 at = clamp(texel + ivec2(i % 3, i / 3) - 1, ivec2(0), textureSize(source, 0) - 1);
+        float alpha = texelFetch(source, at, 0).a;
+        least = min(least, alpha);
+        most = max(most, alpha);
+    }
+    return clamp(texture(previous_coverage, uv).r, least, most);
+}
+#endif
+
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
     vec4 source_color = texelFetch(source, texel, 0);
@@ -101,15 +123,26 @@ void main() {
         previous = texelFetch(previous_history, texel, 0);
         max_count = float(max(frames, frames_at_rest));
         previous.rgb = rgb_to_ycocg(previous.rgb);
+#if TRANSPARENT
+        coverage = texelFetch(previous_coverage, texel, 0).r;
+#endif
     } else {
         vec2 uv = gl_FragCoord.xy / vec2(textureSize(source, 0)) - motion_at(texel);
         bool on_screen = all(greaterThanEqual(uv, vec2(0.0))) && all(lessThanEqual(uv, vec2(1.0)));
         previous = on_screen ? sample_history(uv) : vec4(0.0);
         vec3 clipped = clip_to_neighborhood(rgb_to_ycocg(previous.rgb), texel);
         previous = vec4(clipped, min(previous.a, max_count));
+#if TRANSPARENT
+        coverage = moved_coverage(uv, texel);
+#endif
     }
     float count = min(floor(previous.a + 0.5), max_count - 1.0) + 1.0;
     vec3 mean = count > 1.0 ? mix(previous.rgb, current, 1.0 / count) : current;
     history = vec4(ycocg_to_rgb(mean), count);
+#if TRANSPARENT
+    coverage = count > 1.0 ? mix(coverage, source_color.a, 1.0 / count) : source_color.a;
+    color = light_to_display(vec4(clamp(ycocg_to_rgb(mean), 0.0, coverage), coverage));
+#else
     color = vec4(linear_to_srgb(clamp(ycocg_to_rgb(mean), 0.0, 1.0)), source_color.a);
+#endif
 }

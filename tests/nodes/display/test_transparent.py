@@ -87,6 +87,41 @@ def test_full_keeps_alpha_and_meters_what_is_there(session: rg.Session, tmp_path
     assert clear["image"][32, 45, :3].max() < 250
 
 
+BAR = """scene: 1
+objects: {bar: {shape: box, size: [20, 1, 0.001], rotate_degrees: [0, 0, 10], material: lamp}}
+materials: {lamp: {base_color: %s, unlit: true}}
+cameras: {main: {eye: [0, 0, 4], target: [0, 0, 0], fov_y_degrees: 40}}
+"""
+
+
+@pytest.mark.parametrize("level", [0.0, 0.4])
+@pytest.mark.parametrize(("pipeline", "frame"), [("fxaa", 1), ("smaa", 1), ("taa", 12)])
+def test_edges_are_smooth_in_alpha_and_keep_their_colour(
+    session: rg.Session, tmp_path: Path, pipeline: str, frame: int, level: float
+) -> None:
+    """A bar of one colour: over nothing it has that colour in all pixels, and alpha is what it covers of them."""
+    (tmp_path / "scene.yaml").write_text(BAR % level)
+    loaded = rg.load(
+        pipeline,
+        scene=tmp_path / "scene.yaml",
+        size=(48, 32),
+        sets=["display.curve=none", "display.dither=false"],
+        environment=Path("none"),
+        transparent=True,
+    )
+    found = session.render(loaded, outputs=["image"], frames=range(frame, frame + 1))["image"].astype(float) / 255
+    y, x = (np.mgrid[0:320, 0:480] + 0.5) / 10
+    unit, turn = 16 / np.tan(np.radians(20)) / 4, np.radians(10)
+    fine = (np.abs((16 - y) * np.cos(turn) - (x - 24) * np.sin(turn)) < unit / 2).astype(float)
+    covered = fine.reshape(32, 10, 48, 10).mean(axis=(1, 3))
+    hard = np.abs(fine[5::10, 5::10] - covered).mean()
+    off = np.abs(found[..., 3] - covered).mean()
+    assert off < (0.2 if pipeline == "taa" else 0.5) * hard
+    inside = found[..., 3] > 0.2
+    color = float(to_srgb(np.array(level)))
+    np.testing.assert_allclose(found[inside][:, :3] / found[inside][:, 3:], color, atol=0.02)
+
+
 def test_a_pipeline_without_alpha_is_told(tmp_path: Path) -> None:
     (tmp_path / "p.yaml").write_text(
         "rendergraph: 1\nnodes: {depth: {type: depth_prepass}}\noutputs: {depth: depth.depth}\n"
