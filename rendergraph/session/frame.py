@@ -180,7 +180,9 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
         for name, array in self.arrays.items():
             if self.infos[name].semantic != "display_color" or array.dtype != "uint8" or array.shape[-1] < 3:
                 continue
-            colors = array[..., :3]
+            colors = array[array[..., 3] == 255, :3] if self.infos[name].transparent else array[..., :3]
+            if not colors.size:
+                continue
             if colors.mean() < _BLACK:
                 found[name] = "almost black"
             elif (colors.max(axis=-1) >= _CLIPPED).mean() > 0.5:

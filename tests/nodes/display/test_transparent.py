@@ -122,6 +122,16 @@ def test_edges_are_smooth_in_alpha_and_keep_their_colour(
     np.testing.assert_allclose(found[inside][:, :3] / found[inside][:, 3:], color, atol=0.02)
 
 
+def test_a_small_object_over_nothing_is_not_called_black(session: rg.Session, tmp_path: Path) -> None:
+    (tmp_path / "scene.yaml").write_text((BAR % 0.4).replace("[20, 1, 0.001]", "[0.1, 0.1, 0.1]"))
+    for exposure, found in ((0, {}), (-12, {"image": "almost black"}), (8, {"image": "clipped in more than half"})):
+        sets = [f"display.exposure={exposure}", "display.curve=none"]
+        loaded = rg.load("forward", scene=tmp_path / "scene.yaml", size=(96, 64), sets=sets, transparent=True)
+        frame = session.render(loaded, outputs=["image"])
+        assert np.mean(frame["image"][..., :3]) < 5
+        assert {name: text[: len(found.get(name, text))] for name, text in frame.badly_exposed.items()} == found
+
+
 def test_a_pipeline_without_alpha_is_told(tmp_path: Path) -> None:
     (tmp_path / "p.yaml").write_text(
         "rendergraph: 1\nnodes: {depth: {type: depth_prepass}}\noutputs: {depth: depth.depth}\n"
