@@ -33,8 +33,8 @@ T = TypeVar("T")
 
 MOST_SIDE = 1024  # of a picture, which travels in a message, and which a CPU may have to render
 _INSTRUCTIONS = """Renderers are YAML files, whose nodes are render passes. A `pipeline` is a shipped name (`forward`),
-a YAML file, or the YAML text of a pipeline itself, such as `extends: forward` with changes. `settings` are texts such
-as `shadows.taps=4`, `ao.enabled=false` or `scene.lights.key.intensity=2`. Begin with `explain` of `pipeline`."""
+a YAML file, or YAML text, such as `extends: forward` with changes. `settings` are texts such as `shadows.taps=4` or
+`scene.lights.key.intensity=2`. Begin with `explain` of `pipeline`."""
 _PATH_LIKE = re.compile(r"[^\s\[\]{}:,\"'=]+")
 
 
@@ -51,6 +51,7 @@ def command(root: str, write: bool, as_json: bool) -> None:
     \b
     Examples:
       rendergraph mcp --root study --write
+      rendergraph mcp --json
     """
     if as_json:
         words = ["mcp", "--root", str(Path(root).resolve()), *(["--write"] if write else [])]

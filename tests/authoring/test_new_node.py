@@ -180,7 +180,7 @@ def test_a_full_disk_leaves_nothing_behind(package: bool, tmp_path: Path, monkey
     real, calls = Path.open, []
 
     def full(self: Path, mode: str = "r", *arguments: Any, **options: Any) -> Any:
-        if mode == "x":
+        if mode == "xb":
             calls.append(self)
             if len(calls) == 4:
                 raise OSError(errno.ENOSPC, "No space left on device", str(self))

@@ -34,6 +34,8 @@ def examples(cli: Any, *verb: str) -> list[list[str]]:
 
 
 def has_no_end(words: list[str]) -> bool:
+    if words[0] == "mcp":
+        return "--json" not in words
     return "--watch" in words or (words[0] == "view" and "--export" not in words)
 
 

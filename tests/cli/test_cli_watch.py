@@ -254,7 +254,7 @@ def test_settings_and_a_python_node_with_its_helper_are_followed(folder: Path, s
 
 def test_a_sub_pipeline_and_a_texture_are_followed(folder: Path, start: Start) -> None:
     def paint(value: int) -> None:
-        info = SimpleNamespace(semantic="display_color", format="rgba8", encoding="display")
+        info = SimpleNamespace(semantic="display_color", format="rgba8", encoding="display", transparent=False)
         images.save_output(folder / "paint.png", np.full((4, 4, 4), value, np.uint8), info, {})
 
     paint(255)
