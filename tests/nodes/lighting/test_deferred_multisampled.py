@@ -66,6 +66,7 @@ def test_edges_of_shadows_within_a_surface_are_lit_sample_by_sample(
     assert (steps_apart(blind, every) > 1).mean() > 0.005, "edges that are not found would not show"
 
 
+@pytest.mark.nightly
 def test_marked_pixels_are_those_of_every_sample_lit(session: rg.Session) -> None:
     """To the border of a picture whose last tiles are parts, whether surfaces or shadows mark."""
     pipeline = rg.load("deferred-msaa", scene="courtyard", size=(81, 46), sets=["light.environment=null"])

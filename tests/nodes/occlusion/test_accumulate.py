@@ -38,7 +38,7 @@ def test_few_samples_in_many_frames_are_many(session: rg.Session) -> None:
     one, many = (drawn(session, as_pipeline(32), frame, frame)[0]["mean"] for frame in (1, 32))
     errors = [float(np.sqrt(((found - exact) ** 2).mean())) for found in (one, many)]
     assert errors[1] < 0.3 * errors[0]
-    assert errors[1] < 0.004
+    assert errors[1] < 0.005
 
 
 SCENE = """scene: 1
