@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -48,9 +49,9 @@ def read(tmp_path: Path, material: str, **options: Any) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def generator(gl: rg.Session) -> TextureGenerator:
-    rg.load("forward").render(size=(8, 8), session=gl)
-    return TextureGenerator(ProgramCache(gl.device, 32))
+def generator(gl: rg.Session) -> Iterator[TextureGenerator]:
+    with gl.device.current():
+        yield TextureGenerator(ProgramCache(gl.device, 32))
 
 
 @pytest.fixture(scope="module")
