@@ -29,7 +29,8 @@ def test_normals_stand_in_the_corner(session: rg.Session) -> None:
     tile = after[2:30, 2:44, :3].astype(float) / 255
     y, x = (np.arange(28) + 0.5) / 28 * 60, (np.arange(42) + 0.5) / 42 * 90
     expected = normals[y.astype(int)][:, x.astype(int), :3] * 0.5 + 0.5
-    np.testing.assert_allclose(tile, expected, atol=0.6 / 255)  # GPUs round to 8 bits within 0.6 steps
+    step = 0.51 if session.device.software else 0.6  # how GPUs round to 8 bits
+    np.testing.assert_allclose(tile, expected, atol=step / 255)
     assert np.ptp(tile, axis=(0, 1)).min() > 0.3
     assert (after[1, 1:45] == 255).all()
     assert (after[30, 1:45] == 255).all()

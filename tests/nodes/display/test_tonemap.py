@@ -113,8 +113,8 @@ def test_curve(session: rg.Session, curve: str, exposure: float) -> None:
     scene = frame["radiance"][..., :3].astype(np.float64)
     expected = srgb(CURVES[curve](np.maximum(scene, 0) * 2.0**exposure)) * 255
     error = np.abs(frame["image"][..., :3] - expected)
-    # `aces2` interpolates in a table.
-    assert error.max() <= (3 if curve == "aces2" else 0.6)  # GPUs round to 8 bits within 0.6 steps
+    # `aces2` interpolates in a table, and GPUs round to 8 bits within 0.6 steps.
+    assert error.max() <= (3 if curve == "aces2" else 0.51 if session.device.software else 0.6)
     assert np.percentile(error, 99) < 1.3
     assert np.all(frame["image"][..., 3] == 255)
 
@@ -187,7 +187,7 @@ def test_gain_multiplies_beside_the_stops(draw: Callable[..., rg.Frame]) -> None
         np.testing.assert_allclose(image[..., :3], srgb(np.full((5, 9, 3), 0.2 * 2.0**stops)), rtol=1e-5)
 
 
-def test_eight_bits_are_dithered_about_the_right_value(draw: Any) -> None:
+def test_eight_bits_are_dithered_about_the_right_value(session: rg.Session, draw: Any) -> None:
     """A ramp of 24 steps over 256 columns: its mean follows the line between the steps, and whole steps are left alone."""
     width, height, low, high = 256, 64, 60, 84
     display = np.linspace(low, high, width) / 255
@@ -197,7 +197,7 @@ def test_eight_bits_are_dithered_about_the_right_value(draw: Any) -> None:
     text += "outputs: {{image: show.color}}"
     plain, dithered = (draw(ramp, text.format(word))["image"][..., 0].astype(float) for word in ("false", "true"))
     right = display * 255
-    assert np.abs(plain - right).max() <= 0.6
+    assert (plain == np.round(right)).all() or (not session.device.software and np.abs(plain - right).max() <= 0.6)
     assert np.abs(dithered - right).max() < 1
     assert np.abs(plain.mean(axis=0) - right).max() > 0.45
     assert np.abs(dithered.mean(axis=0) - right).max() < 0.1
