@@ -18,7 +18,6 @@ from rendergraph import images, stamps
 from rendergraph.compile import Executable
 from rendergraph.document import Source, from_plain
 from rendergraph.errors import Place, Problem, RendergraphError, shown_file
-from rendergraph.formatting import jsonable
 from rendergraph.metrics import measure
 from rendergraph.resolve import diff, to_yaml
 from rendergraph.resources import shipped_scenes
@@ -313,14 +312,15 @@ class RenderService:
 def _view_keys(request: messages.VariantRequest, linked: Linked) -> dict[str, Any]:
     """Return what a scene file says of a camera that was moved, and of the surroundings of the command line."""
     keys: dict[str, Any] = {}
-    opened = request.selection
-    if "=" in (opened.camera or ""):
-        keys["cameras"] = {next(iter(linked.scene.cameras), "main"): jsonable(keys_of(str(opened.camera)))}
-    if opened.environment is not None:
-        keys["environment"] = None if str(opened.environment) == "none" else {"file": str(opened.environment)}
-    if opened.ground:
+    chosen = request.selection
+    if chosen.camera is not None and "=" in chosen.camera:
+        values = {key: list(v) if isinstance(v, tuple) else v for key, v in keys_of(chosen.camera).items()}
+        keys["cameras"] = {next(iter(linked.scene.cameras), "main"): values}
+    if chosen.environment is not None:
+        keys["environment"] = None if str(chosen.environment) == "none" else {"file": str(chosen.environment)}
+    if chosen.ground:
         keys["environment"] = (keys.get("environment") or {}) | {"ground": True}
-    return keys | ({"variant": opened.variant} if opened.variant else {})
+    return keys | ({"variant": chosen.variant} if chosen.variant else {})
 
 
 def _scene_keys(linked: Linked, folder: Path) -> dict[str, Any]:

@@ -170,13 +170,15 @@ def test_a_variant_reads_back_to_what_was_on_the_page(service: RenderService, tm
     assert rg.load(file).resolve().spec.plain() == rg.load("forward", **_kept(changed)).resolve().spec.plain()
 
 
-@pytest.mark.parametrize("scene", [None, "lone"])
+@pytest.mark.parametrize("scene", [None, "lone", "endless"])
 def test_a_variant_shows_the_scene_by_the_camera_that_was_moved(
     service: RenderService, tmp_path: Path, scene: str | None
 ) -> None:
     """Also where the scene has no camera, and its light comes from beside the one that frames it."""
-    (tmp_path / "lone.yaml").write_text("scene: 1\nobjects: {ball: {shape: sphere, radius: 1, segments: 8}}\n")
-    opened = replace(FORWARD, scene=scene and str(tmp_path / "lone.yaml"))
+    ball = "scene: 1\nobjects: {ball: {shape: sphere, radius: 1, segments: 8}}\n"
+    (tmp_path / "lone.yaml").write_text(ball)
+    (tmp_path / "endless.yaml").write_text(ball + "cameras: {c: {eye: [0, 1, 4], far: .inf}}\n")
+    opened = replace(FORWARD, scene=scene and str(tmp_path / f"{scene}.yaml"))
     state = ViewState(opened, tmp_path)
     state.record(service.answer(state.request()))
     before = picture(service.answer(state.request()), tmp_path)
@@ -187,6 +189,7 @@ def test_a_variant_shows_the_scene_by_the_camera_that_was_moved(
     (tmp_path / "variant.yaml").write_text(
         service.answer(VariantRequest(opened, state.selection, tmp_path)).facts["yaml"]
     )
+    assert scene != "endless" or "far: .inf" in (tmp_path / "variant.yaml").read_text()
     saved = service.answer(RenderRequest(rg.Selection(str(tmp_path / "variant.yaml"))))
     np.testing.assert_array_equal(picture(saved, tmp_path), shown)
     state.apply(parse_message('{"do": "undo"}'))
