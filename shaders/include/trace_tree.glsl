@@ -42,8 +42,10 @@ bool trace(
     stack[0] = TRACE_END;
     int top = 1;
     ivec4 header = SCENE_TREE(0), header2 = SCENE_TREE(1);
-    // Invocations outside a triangle that run along in a fragment shader may read 0 everywhere.
-    int node = header2.w > 0 ? header.w : TRACE_END;
+    // Invocations outside a triangle that run along in a fragment shader may read 0 everywhere, and then their rays are
+    // not numbers, which enter every box.
+    bool is_ray = dot(abs(origin) + abs(direction), vec3(1.0)) < 1e30;
+    int node = header2.w > 0 && is_ray ? header.w : TRACE_END;
     vec3 top_origin = (origin - intBitsToFloat(header.xyz)) * intBitsToFloat(header2.xyz);
     vec3 top_inverse = trace_inverse(direction * intBitsToFloat(header2.xyz));
     vec3 grid_origin = top_origin, inverse = top_inverse;  // of the ray on the grid of the tree
