@@ -146,7 +146,8 @@ def plain(value: Value, type: Type) -> Any:
 
 def schema(type: Type) -> Schema:
     if isinstance(type, Recursive):
-        return {"anyOf": [json_schema(type.type), {"$ref": "#"} if type.itself else {"type": "object"}]}
+        place = "#" if type.itself else f"#/definitions/{type.table().what}"
+        return {"anyOf": [json_schema(type.type), {"$ref": place}]}
     if isinstance(type, Table):
         return _table(type)
     if not isinstance(type, MapOf):
@@ -165,7 +166,10 @@ def file_schema(table: Table) -> Schema:
     """Return the schema of a kind of file; its `$id` ends in the version of the format."""
     kind = table.what.split()[1]  # of "a pipeline", "a scene file"
     head = {"$schema": "http://json-schema.org/draft-07/schema#", "$id": f"urn:rendergraph:{kind}:1"}
-    return {**head, **_table(table)}
+    types = [key.type for _, keys in table.sections() for key in keys]
+    inner = [type.table() for type in types if isinstance(type, Recursive) and not type.itself]
+    definitions = {"definitions": {each.what: _table(each) for each in inner}} if inner else {}
+    return {**head, **_table(table), **definitions}
 
 
 def as_markdown(value: Any) -> Any:

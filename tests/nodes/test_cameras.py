@@ -36,7 +36,9 @@ lights:
 cameras:
   main: {eye: [1.8, 2.4, 4], target: [0, 0.5, 0], fov_y_degrees: 42, near: 0.5, far: 20}
 """
-SETS = ("sun.resolution=128", "light.ambient=0.4", "light.blended=false")  # where the pipeline has them
+TRACED = ("light.samples=64", "light.antialiasing=false")
+SETS = ("sun.resolution=128", "light.ambient=0.4", "exposure.limit=0", *TRACED)  # where the pipeline has them
+UNBLENDED = "light.blended=false"
 BLENDING = {"forward", "deferred"}  # drawn with the surfaces that others leave out, to compile less
 PICTURES_OF_THE_SCREEN = {
     "overdraw",
@@ -44,6 +46,7 @@ PICTURES_OF_THE_SCREEN = {
     "shadow-cascaded-shown",
     "shadow-map-shown",
 }  # legends, tiles, several views
+NOT_FROM_AFAR = {"fog", "path-traced-denoised"}  # fog gets thicker, and the filter's tolerance grows with the distance
 SIDE = 32
 AFAR = 100.0
 
@@ -57,7 +60,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def small(name: str, scene: Path) -> rg.Pipeline:
     pipeline = rg.load(name, scene=scene, size=(SIDE, SIDE))
-    for setting in SETS[: 2 if name in BLENDING else 3]:
+    for setting in SETS if name in BLENDING else (*SETS, UNBLENDED):
         path, _, value = setting.partition("=")
         try:
             changed = pipeline.set(path, value)
@@ -123,4 +126,5 @@ def test_every_pipeline_draws_what_every_camera_sees(session: rg.Session, scene:
         assert min(corner.mean(), parallel.mean()) > 2
         return
     assert differing(quarters(corner), plain[: SIDE // 2, SIDE // 2 :], 12) <= 0.08
-    assert differing(parallel, from_afar, 6) <= 0.03
+    if name not in NOT_FROM_AFAR:
+        assert differing(parallel, from_afar, 6) <= 0.03

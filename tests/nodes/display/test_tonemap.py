@@ -114,7 +114,7 @@ def test_curve(session: rg.Session, curve: str, exposure: float) -> None:
     expected = srgb(CURVES[curve](np.maximum(scene, 0) * 2.0**exposure)) * 255
     error = np.abs(frame["image"][..., :3] - expected)
     # `aces2` interpolates in a table, and GPUs round to 8 bits within 0.6 steps.
-    assert error.max() <= (3 if curve == "aces2" else 0.51 if session.device.software else 0.6)
+    assert error.max() <= (3 if curve == "aces2" else 0.52 if session.device.software else 0.6)
     assert np.percentile(error, 99) < 1.3
     assert np.all(frame["image"][..., 3] == 255)
 
