@@ -158,6 +158,7 @@ class LentGpu(Gpu):
 @pytest.fixture
 def lent_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let command lines that run in this process draw on one context."""
+    assert issubclass(rg.Session, Gpu)  # it is imported here, before its base class is replaced
     monkeypatch.setattr(gpu, "Gpu", LentGpu)
 
 

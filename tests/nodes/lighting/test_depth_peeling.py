@@ -71,7 +71,9 @@ def test_crossing_panes_have_the_order_of_each_pixel(radiance: Any, crossed: Pat
 
 def test_it_draws_what_sorting_draws_where_that_is_right(session: rg.Session, steps_off: Any, tmp_path: Path) -> None:
     """Under a light and its shadows, over forward and deferred shading, with one sample a pixel and with several."""
-    lines = shipped_scenes()["glass"].read_text().splitlines(keepends=True)
+    text = shipped_scenes()["glass"].read_text()
+    text = text.replace("at: [-0.4, 0.95, 0.5]", "at: [-0.4, 0.95, 0.9]")  # no pane cuts another, or the ball
+    lines = text.splitlines(keepends=True)
     (tmp_path / "apart.yaml").write_text("".join(line for line in lines if not line.startswith("  green_pane")))
     links = {"radiance": "light.radiance", "depth": "light.surface_depth", "lookup": "shadows.lookup"}
     patch = {

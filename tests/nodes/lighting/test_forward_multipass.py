@@ -13,9 +13,12 @@ import rendergraph as rg
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ["cornell_box", "spheres", "many_lights"])
 def test_it_draws_the_forward_picture(radiance: Any, steps_off: Any, scene: str) -> None:
-    """Where two surfaces lie at exactly the same depth, both are added: a pixel of the columns' rims may be off."""
+    """Where two surfaces lie at exactly the same depth, both are added: some pixels of the columns' rims may be off.
+
+    How many depends on how the processor rounds; a light that is missing would show in thousands.
+    """
     off = steps_off(radiance("forward-multipass", scene), radiance("forward", scene))
-    assert (off > 1.001).mean() <= 2e-4
+    assert (off > 1.001).sum() <= 10
 
 
 def test_blended_surfaces_come_last(radiance: Any, steps_off: Any) -> None:
