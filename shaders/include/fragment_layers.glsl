@@ -1,5 +1,6 @@
 // What the textures of a fragment's layers hold.
 #include <layers.glsl>
+#include <material_texel.glsl>
 #include <texture_coordinates.glsl>
 
 #if defined(HAS_CLEARCOAT_NORMAL_TEXTURE) && defined(CLEARCOAT_LAYER)
@@ -52,7 +53,7 @@ uniform sampler2D thickness_texture;
 #endif
 
 #ifdef HAS_LAYERS
-#define LAYER_TEXEL(sampler, slot, set) texture(sampler, slot_uv(material, slot, UV_SET(set)))
+#define LAYER_TEXEL(sampler, slot, set) material_texel(sampler, slot_uv(material, slot, UV_SET(set)))
 
 // What the textures of the layers hold here; the coat's normal is `normal` without a map of its own.
 LayerTexels layer_texels(int material, MaterialData m, vec3 normal, vec3 tangent, vec3 bitangent) {

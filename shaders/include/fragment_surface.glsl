@@ -79,35 +79,35 @@ Surface fragment_surface(View view) {
     MaterialTexels texels = no_texels();
 #ifdef HAS_METALLIC_ROUGHNESS_TEXTURE
     vec2 uv = slot_uv(v_material, METALLIC_ROUGHNESS_SLOT, UV_SET(METALLIC_ROUGHNESS_UV));
-    texels.metallic_roughness = texture(metallic_roughness_texture, uv).rgb;
+    texels.metallic_roughness = material_texel(metallic_roughness_texture, uv).rgb;
     texels.has_metallic_roughness = true;
 #endif
 #ifdef HAS_SPECULAR_TEXTURE
-    texels.specular.a = texture(specular_texture, slot_uv(v_material, SPECULAR_SLOT, UV_SET(SPECULAR_UV))).a;
+    texels.specular.a = material_texel(specular_texture, slot_uv(v_material, SPECULAR_SLOT, UV_SET(SPECULAR_UV))).a;
 #endif
 #ifdef HAS_SPECULAR_COLOR_TEXTURE
     texels.specular.rgb =
-        texture(specular_color_texture, slot_uv(v_material, SPECULAR_COLOR_SLOT, UV_SET(SPECULAR_COLOR_UV))).rgb;
+        material_texel(specular_color_texture, slot_uv(v_material, SPECULAR_COLOR_SLOT, UV_SET(SPECULAR_COLOR_UV))).rgb;
 #endif
     s.normal = normalize(v_normal);
 #ifdef NEEDS_TANGENT
     tangent_frame(s.normal, s.tangent, s.bitangent);
 #endif
 #ifdef HAS_NORMAL_TEXTURE
-    texels.normal = texture(normal_texture, slot_uv(v_material, NORMAL_SLOT, UV_SET(NORMAL_UV))).xyz;
+    texels.normal = material_texel(normal_texture, slot_uv(v_material, NORMAL_SLOT, UV_SET(NORMAL_UV))).xyz;
     texels.has_normal = true;
 #endif
 #if defined(HAS_ANISOTROPY_TEXTURE) && defined(NEEDS_GRAIN)
     vec2 anisotropy_uv = slot_uv(v_material, ANISOTROPY_SLOT, UV_SET(ANISOTROPY_UV));
-    texels.anisotropy = texture(anisotropy_texture, anisotropy_uv).rgb;
+    texels.anisotropy = material_texel(anisotropy_texture, anisotropy_uv).rgb;
     texels.has_anisotropy = true;
 #endif
 #ifdef HAS_OCCLUSION_TEXTURE
-    texels.occlusion = texture(occlusion_texture, slot_uv(v_material, OCCLUSION_SLOT, UV_SET(OCCLUSION_UV))).r;
+    texels.occlusion = material_texel(occlusion_texture, slot_uv(v_material, OCCLUSION_SLOT, UV_SET(OCCLUSION_UV))).r;
     texels.has_occlusion = true;
 #endif
 #ifdef HAS_EMISSIVE_TEXTURE
-    texels.emissive = texture(emissive_texture, slot_uv(v_material, EMISSIVE_SLOT, UV_SET(EMISSIVE_UV))).rgb;
+    texels.emissive = material_texel(emissive_texture, slot_uv(v_material, EMISSIVE_SLOT, UV_SET(EMISSIVE_UV))).rgb;
 #endif
 #ifdef HAS_LAYERS
     LayerTexels layers = LAYER_TEXELS(s, m, v_material);

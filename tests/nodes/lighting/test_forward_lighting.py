@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pytest
 
 import rendergraph as rg
+from rendergraph.images import write
 from rendergraph.scene.load import load
 
 Floats = npt.NDArray[np.float64]
@@ -25,6 +26,27 @@ def render(session: rg.Session, pipeline: str, scene: Path | str, size: tuple[in
 def exr(file: Path) -> Floats:
     oiio = pytest.importorskip("OpenImageIO")
     return np.asarray(oiio.ImageBuf(str(file)).get_pixels(oiio.FLOAT), np.float64)[..., :3]
+
+
+# --- textures ---------------------------------------------------------------------------------------------------------
+
+HORIZON = """scene: 1
+objects: {ground: {shape: plane, size: [20000, 20000], uv: metres, material: chart}}
+materials: {chart: {unlit: true, base_color_texture: chart.png}}
+cameras: {main: {eye: [0, 1, 0], target: [0.3, 1, -1], fov_y_degrees: 40, far: 30000}}
+"""
+
+
+def test_a_texture_has_its_mean_colour_up_to_the_horizon(session: rg.Session, tmp_path: Path) -> None:
+    """A pixel sees thousands of repetitions there, each of which a software rasteriser would visit."""
+    texels = np.random.default_rng(1).integers(0, 256, (16, 8, 3))
+    texels[..., 0] = 255
+    write(tmp_path / "chart.png", texels.astype(np.uint8))
+    (tmp_path / "chart.yaml").write_text(HORIZON)
+    found = render(session, "forward", tmp_path / "chart.yaml", (33, 24), *BARE)
+    linear = np.where(texels <= 10, texels / 255 / 12.92, ((texels / 255 + 0.055) / 1.055) ** 2.4)
+    np.testing.assert_allclose(found[12:14, :, :3], np.broadcast_to(linear.mean((0, 1)), (2, 33, 3)), atol=0.01)
+    assert found[22:, :, 1].std() > 0.05  # near the viewer single texels are seen
 
 
 # --- direct light against the analytic spheres -----------------------------------------------------------------------
