@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rendergraph.scene.model import Scene
     from rendergraph.scene.reading import Reading
 
-MESHES = (".obj", ".gltf", ".glb", ".npz")
+MESHES = (".obj", ".gltf", ".glb", ".npz", ".usd", ".usda", ".usdc", ".usdz")
 
 
 def read(path: Path, reading: Reading) -> Scene:
@@ -25,6 +25,10 @@ def read(path: Path, reading: Reading) -> Scene:
         from rendergraph.pipelines.formats.npz import read_npz  # each reader comes with its first file
 
         return read_npz(path, reading)
+    if path.suffix.lower().startswith(".usd"):
+        from rendergraph.pipelines.formats.usd import read_usd  # each reader comes with its first file
+
+        return read_usd(path, reading)
     from rendergraph.pipelines.formats.gltf import read_gltf  # each reader comes with its first file
 
     return read_gltf(path, reading)

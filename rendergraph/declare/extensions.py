@@ -26,8 +26,9 @@ if TYPE_CHECKING:
     Metric: TypeAlias = Callable[[npt.NDArray[Any], npt.NDArray[Any]], float]
     ImageLoader: TypeAlias = Callable[[bytes], npt.NDArray[Any]]
     MeshLoader: TypeAlias = "Callable[[Path], MeshData | Sequence[MeshData]]"
+    SceneLoader: TypeAlias = Callable[[Path, Any], Any]
 else:
-    Metric = ImageLoader = MeshLoader = Callable
+    Metric = ImageLoader = MeshLoader = SceneLoader = Callable
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -79,6 +80,9 @@ class Extension(Struct, frozen=True):
             extension's module. The parameter's node says what the include defines; its opening comment is its
             documentation, and `#pragma needs(…)` names what it needs and other choices do not.
         meshes: a file's ending (`.stl`) to the function that reads such a file, as a scene and as an object's `file`.
+        scenes: a file's ending to the function that reads a whole scene, with materials, lights and cameras: from the
+            path and a `rendergraph.scene.reading.Reading`, which opens further files and images, to a
+            `rendergraph.scene.model.Scene`.
         images: a file's ending to the function that decodes its bytes: (height, width), or with 1 to 4 channels behind,
             the top row first, uint8 (sRGB where the slot is a colour) or floats (linear light).
         metrics: name to a function of two pictures, (height, width, 3) in float64, sRGB-encoded from 0 to 1 where they
@@ -90,6 +94,7 @@ class Extension(Struct, frozen=True):
     semantics: tuple[Semantic, ...] = ()
     choices: Mapping[str, Mapping[Word, Include]] = {}
     meshes: Mapping[Ending, MeshLoader] = {}
+    scenes: Mapping[Ending, SceneLoader] = {}
     images: Mapping[Ending, ImageLoader] = {}
     metrics: Mapping[Word, Metric] = {}
     scene_keys: Mapping[Section, tuple[SceneKey, ...]] = {}
@@ -98,8 +103,10 @@ class Extension(Struct, frozen=True):
 
 READ_IMAGES = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga")
 """Endings of image files that need no plugin."""
+_READ_SCENES = (".yaml", ".yml", ".obj", ".gltf", ".glb", ".npz", ".usd", ".usda", ".usdc", ".usdz")
 _TAKEN = {
-    "meshes": ((".yaml", ".yml", ".obj", ".gltf", ".glb"), "meshes has '{}', which rendergraph reads itself"),
+    "meshes": (_READ_SCENES, "meshes has '{}', which rendergraph reads itself"),
+    "scenes": (_READ_SCENES, "scenes has '{}', which rendergraph reads itself"),
     "images": (READ_IMAGES, "images has '{}', which rendergraph reads itself"),
     "metrics": (
         ("flip", "rmse", "psnr", "ssim", "radiance_rmse"),
@@ -152,7 +159,7 @@ class Added(Struct, Generic[T], frozen=True):
     file: Path
 
     def run(self: Added[Callable[..., R]], code: str, doing: str, *arguments: Any) -> R:
-        """Call what was added; whatever it raises is an error at the author's line.
+        """Call what was added; whatever it raises but `InputError` is an error at the author's line.
 
         Args:
             code: of the error.
@@ -165,7 +172,7 @@ class Added(Struct, Generic[T], frozen=True):
         try:
             return self.value(*arguments)
         except BaseException as error:
-            if is_interruption(error):
+            if is_interruption(error) or isinstance(error, InputError):
                 raise
             place = source_location(error, self.file.parent) or Place(shown_file(self.file))
             text = f"{doing}: {describe_error(error)} (plugin '{self.plugin}')"
@@ -228,6 +235,10 @@ class Extensions:
         """The reader of mesh files of an ending."""
         return _one("mesh loader", ending.lower(), self.meshes())
 
+    def scene_loader(self, ending: str) -> Added[SceneLoader] | None:
+        """The reader of whole scenes in files of an ending."""
+        return _one("scene loader", ending.lower(), self.scenes())
+
     def image_loader(self, ending: str) -> Added[ImageLoader] | None:
         """The decoder of image files of an ending."""
         return _one("image loader", ending.lower(), self._added("images"))
@@ -248,6 +259,10 @@ class Extensions:
     def meshes(self) -> list[Added[MeshLoader]]:
         """Loaders of mesh files, by ending."""
         return self._added("meshes")
+
+    def scenes(self) -> list[Added[SceneLoader]]:
+        """Loaders of whole scenes, by ending."""
+        return self._added("scenes")
 
     def metrics(self) -> list[Added[Metric]]:
         """Metrics of pictures, by name; two plugins with one name are an error."""
@@ -285,6 +300,7 @@ class Extensions:
         rows += self._choices()
         for field, kind in (
             ("meshes", "mesh loader"),
+            ("scenes", "scene loader"),
             ("images", "image loader"),
             ("metrics", "metric"),
             ("textures", "kind of texture"),

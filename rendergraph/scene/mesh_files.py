@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rendergraph.declare import Added, MeshData
-from rendergraph.declare.extensions import MeshLoader
+from rendergraph.declare.extensions import MeshLoader, SceneLoader
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.pipelines.formats import MESHES as MESHES
@@ -26,12 +27,25 @@ def read_mesh(path: Path, reading: Reading, unknown: Problem, known: tuple[str, 
     extension = path.suffix.lower()
     if extension in MESHES:
         return read(path, reading)
+    if (of_scenes := reading.extensions.scene_loader(extension)) is not None:
+        return _read_plugin_scene(path, of_scenes, reading)
     loader = reading.extensions.mesh_loader(extension)
     if loader is None:
-        names = [*known, *(added.name for added in reading.extensions.meshes())]
+        added: list[Added[Any]] = [*reading.extensions.scenes(), *reading.extensions.meshes()]
+        names = [*known, *(one.name for one in added)]
         text = f"{unknown.text} {', '.join(dict.fromkeys(names))}"
         raise InputError([Problem(unknown.code, text, unknown.place), *reading.extensions.problems])
     return _read_plugin_mesh(path, loader, reading)
+
+
+def _read_plugin_scene(path: Path, loader: Added[SceneLoader], reading: Reading) -> Scene:
+    """The scene of a plugin's loader, which says of mistakes in the file itself."""
+    reading.check_file(path, "scene file")
+    what = f"scene '{shown(path.name)}'"
+    result = loader.run("RG497", f"{what} cannot be read", path, reading)
+    if not isinstance(result, Scene):
+        raise _unusable(loader, what, f"{type(result).__name__}, not a Scene")
+    return result
 
 
 # Meshes of plugins ----------------------------------------------------------------------------------------------------
@@ -68,7 +82,7 @@ def _read_plugin_mesh(path: Path, loader: Added[MeshLoader], reading: Reading) -
     return Scene(path.stem, path, tuple(objects), tuple(meshes), tuple(materials))
 
 
-def _unusable(loader: Added[MeshLoader], what: str, text: str) -> InputError:
+def _unusable(loader: Added[Any], what: str, text: str) -> InputError:
     text = f"{what} cannot be read: the loader of plugin '{loader.plugin}' returned {text}"
     return InputError(Problem("RG498", text, Place(shown_file(loader.file))))
 

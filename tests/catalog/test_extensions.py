@@ -397,9 +397,48 @@ def test_a_plugins_texture(gl: rg.Session, loaders: Path, tmp_path: Path) -> Non
     assert red > 4 * green + 50
 
 
+SCENES = """
+import numpy as np
+from rendergraph.scene.model import Camera, Light, Material, Mesh, Object, Scene
+
+def read_room(path, reading):
+    size = float(reading.read(path, "room"))
+    if size <= 0:
+        raise reading.error("RG304", "a room is larger than 0", line=1)
+    plane = np.array([[-size, 0, -size], [-size, 0, size], [size, 0, size], [size, 0, -size]], np.float32)
+    up = np.tile(np.array([0, 1, 0], np.float32), (4, 1))
+    mesh = Mesh("floor", plane, np.array([[0, 1, 2], [0, 2, 3]], np.uint32), up)
+    place = np.eye(4)
+    place[:3, 3] = 0, 1, 3
+    lamp = Light("lamp", "point", (0.0, 2.0, 0.0), intensity=9.0)
+    objects, materials = (Object("floor", 0, 0, np.eye(4), node="floor"),), (Material("red", (1.0, 0.0, 0.0, 1.0)),)
+    return Scene("room", path, objects, (mesh,), materials, (lamp,), {"door": Camera("door", place)})
+
+EXTENSION = Extension(scenes={".room": read_room})
+"""
+
+
+def test_a_plugin_reads_a_whole_scene(write: Write, gl: rg.Session, tmp_path: Path) -> None:
+    """With its lights and cameras, alone and as an object; the reader says of mistakes in the file itself."""
+    home = write(SCENES)
+    (tmp_path / "a.room").write_text("4")
+    pipeline = rg.load("forward", plugins=[home], scene=tmp_path / "a.room", size=(16, 16), environment="none")
+    scene = pipeline.link().scene
+    assert ([light.name for light in scene.lights], [*scene.cameras]) == (["lamp"], ["door"])
+    red, green, _ = gl.render(pipeline)["image"][15, 8, :3].astype(int)
+    assert red > 4 * green + 50
+    (tmp_path / "s.yaml").write_text("scene: 1\nobjects: {a: {file: a.room, at: [0, 1, 0]}}\n")
+    (object_,) = rg.load("forward", plugins=[home], scene=tmp_path / "s.yaml").link().scene.objects
+    assert object_.transform[1, 3] == 1
+    (tmp_path / "a.room").write_text("-1")
+    with pytest.raises(InputError, match=r"a\.room:1:1: RG304 a room is larger than 0"):
+        rg.load("forward", plugins=[home], scene=tmp_path / "a.room").link()
+
+
 def test_without_the_plugin_its_files_are_nothing(loaders: Path, tmp_path: Path) -> None:
     with pytest.raises(
-        InputError, match=r"RG303 'a\.tri' is not a scene; a scene ends in \.yaml, \.yml, \.obj, .*, \.glb, \.npz$"
+        InputError,
+        match=r"RG303 'a\.tri' is not a scene; a scene ends in \.yaml, \.yml, \.obj, .*, \.glb, \.npz, .*, \.usdz$",
     ):
         rg.load("forward", scene=tmp_path / "a.tri").check()
     with pytest.raises(InputError, match=r"s\.yaml:3:\d+: RG303 'a\.tri' is not a mesh file; a mesh ends in \.obj"):

@@ -1,0 +1,4 @@
+# USD's Python modules have no types of their own.
+from typing import Any
+
+def __getattr__(name: str) -> Any: ...
