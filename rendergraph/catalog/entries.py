@@ -14,9 +14,18 @@ from rendergraph.catalog.parameter import ParameterReader, uniform_names
 from rendergraph.declare import Extensions, Facts, Input, Node, Output, Parameter, Port, Ruled, SizeRule, WrittenPort
 from rendergraph.document import Value
 from rendergraph.errors import Place, Problem, shown_file, suggestion
-from rendergraph.glsl import SourceText, strip_comments
+from rendergraph.glsl import SourceText, is_shadertoy, strip_comments
 from rendergraph.glsl.globals import Global, globals_of
-from rendergraph.textures import FORMATS, GLSL_SHAPES, SEMANTICS, SIGNATURES, SceneData, Semantic, Signature
+from rendergraph.textures import (
+    FORMATS,
+    GLSL_SHAPES,
+    SEMANTICS,
+    SIGNATURES,
+    DisplayColor,
+    SceneData,
+    Semantic,
+    Signature,
+)
 from rendergraph.textures import Any as AnyTexture
 
 _SAMPLER = re.compile(r"[iu]?sampler(2D|2DArray|3D|Cube|2DMS|2DMSArray)(Shadow)?\Z")
@@ -27,6 +36,18 @@ _INTEGER_FORMATS = {"uint": "r32ui", "uvec2": "rg32ui", "uvec3": "rgba32ui", "uv
 _INTEGER_FORMATS |= {"int": "r32i", "ivec2": "rg32i", "ivec3": "rgba32i", "ivec4": "rgba32i"}
 _VARYINGS = ("v_uv",)
 """Varyings of the full-screen vertex shader."""
+_SHADERTOY_PORTS: dict[str, Port] = {
+    "image": Output(DisplayColor, format="rgba8", doc="The picture, as Shadertoy shows it."),
+    "values": Output(
+        AnyTexture, format="rgba32f", doc="The same in float32 with alpha, as Shadertoy's buffers hold it."
+    ),
+    **{
+        f"iChannel{number}": Input(
+            AnyTexture, size="any", filter="linear", wrap="repeat", doc=f"What the program reads as iChannel{number}."
+        )
+        for number in range(4)
+    },
+}
 MOST_NAMES = 256
 """Limit of ports and parameters of a shader file."""
 
@@ -51,6 +72,7 @@ class Entries:
         self._without_range: list[str] = []
         self._outs = [found for found in self.globals.declared if found.storage == "out"]
         self._renamed: dict[str, str] = {}
+        self._is_shadertoy = file.suffix == ".frag" and is_shadertoy(raw)
 
     def report(self, code: str, text: str, found: Global | None = None) -> None:
         """Note a mistake at a declaration, or in the file as a whole."""
@@ -106,7 +128,9 @@ class Entries:
         if name in self.header.names or name in self._renamed or name.startswith("gl_") or is_of_many:
             return
         stored = found.storage == "buffer" or _IMAGE.match(found.type)
-        if found.storage == "in":
+        if self._is_shadertoy and name in _SHADERTOY_PORTS:
+            self.ports[name] = _SHADERTOY_PORTS[name]
+        elif found.storage == "in":
             if name not in _VARYINGS:
                 self.report(
                     "RG441", f"nothing writes the varying '{name}'; a full-screen pass has v_uv, from 0 to 1", found
@@ -338,7 +362,7 @@ class Entries:
         missing = [] if self.header.doc else ["doc of the node"]
         missing += [f"doc of {_listed(undocumented)}"] if undocumented else []
         missing += [f"min and max of {_listed(self._without_range)}"] if self._without_range else []
-        if missing:
+        if missing and not self._is_shadertoy:
             text = f"shader node '{self.file.name}' lacks {'; '.join(missing)}; add them to its header"
             yield Problem("RG445", text, self._start, severity="warning")
         match = re.search(r"\bdiscard\b", self.text)

@@ -4,4 +4,4 @@ from __future__ import annotations
 
 from rendergraph.glsl.files import MAX_BYTES, Links, about, read_text, strip_comments
 from rendergraph.glsl.names import declared
-from rendergraph.glsl.source import MAX_DEPTH, Includes, Origin, SourceText
+from rendergraph.glsl.source import MAX_DEPTH, Includes, Origin, SourceText, is_shadertoy

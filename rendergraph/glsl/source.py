@@ -106,6 +106,16 @@ def generated(lines: Iterable[str], purpose: str = "") -> SourceText:
     return SourceText((SourceBlock(tuple(lines), Origin(purpose=purpose)),))
 
 
+_MAIN_IMAGE = re.compile(r"^\s*void\s+mainImage\s*\(", re.MULTILINE)
+_MAIN = re.compile(r"^\s*void\s+main\s*\(", re.MULTILINE)
+_CHANNEL = re.compile(r"\biChannel([0-3])\b|\biChannelResolution\b")
+
+
+def is_shadertoy(text: str) -> bool:
+    """Whether a shader is one of Shadertoy's: it has a `mainImage` and no `main`."""
+    return _MAIN_IMAGE.search(text) is not None and _MAIN.search(text) is None
+
+
 _PARAMETER = re.compile(r"<([A-Z][A-Z0-9_]*)>\Z")
 _INCLUDE_NAME = re.compile(r'"([^"<>]+)"\Z|<([^"<>]+)>\Z')
 
@@ -164,8 +174,28 @@ class Includes:
         self._plugged = dict(plugged or {})
         self._versions = versions
         self._inherited = inherited
+        around = source.suffix == ".frag" and is_shadertoy(runs(source)[0])
+        if around:
+            self._before_shadertoy(runs(source)[0])
         self._file(source, root, Origin(prefix=prefix), [])
+        if around:
+            end = "void main() { mainImage(values, gl_FragCoord.xy); image = vec4(values.rgb, 1.0); }"
+            self._blocks.append(SourceBlock((end,), Origin(purpose="the end of a Shadertoy program")))
         return SourceText(tuple(self._blocks))
+
+    def _before_shadertoy(self, text: str) -> None:
+        """Declare what a Shadertoy program reads and writes: its channels, where it names them, and two outputs."""
+        found = {match[1] for match in _CHANNEL.finditer(text)}
+        channels = sorted(found - {None}) if found else []
+        lines = [f"uniform sampler2D iChannel{number};" for number in channels]
+        if re.search(r"\biMouse\b", text):
+            lines.append("uniform vec4 iMouse = vec4(0.0);")
+        if None in found:
+            sizes = (f"vec3(textureSize(iChannel{n}, 0), 1.0)" if str(n) in channels else "vec3(1.0)" for n in range(4))
+            lines.append(f"#define iChannelResolution vec3[4]({', '.join(sizes)})")
+        lines += ["out vec4 image;", "out vec4 values;"]
+        self._blocks.append(SourceBlock(tuple(lines), Origin(purpose="the beginning of a Shadertoy program")))
+        self._include(self.include_folder / "shadertoy.glsl", self.include_folder, Origin(shared=True), [])
 
     def _file(self, file: Path, root: Path, base: Origin, stack: list[str]) -> None:
         raw, found = runs(file)
