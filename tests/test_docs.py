@@ -383,4 +383,4 @@ def test_the_comparison_is_what_the_files_give(gl: Any, tmp_path: Path, monkeypa
         assert unit == "MiB"
         assert float(size) == pytest.approx(float(str(result.memory["allocated_bytes"])) / (1 << 20), abs=0.06)
     difference = np.abs(made.side_by_side(found).astype(np.float64) - read(made.PICTURE)[..., :3])
-    assert difference.mean() < 1.0, "run docs/_generate/comparison.py again"
+    assert difference.mean() < 1.0, "make pictures ONLY=comparison"

@@ -1,8 +1,8 @@
 """Hold every technique against its traced twin: `python against_twins.py [FOLDER] [shadows] [occlusion] [light]`.
 
-Tables go to stdout. A folder gets four pictures: of each family a sheet with the truth first, then one column for each
-technique, a magnified part above and its signed error below (red is too dark, blue too bright), and
-`how-wrong-fails.png`, in which the truth itself has too few rays.
+Tables go to stdout. A folder gets a picture of each family, with the truth first and then the techniques: a magnified
+part above, and its signed error below (red is too dark, blue too bright). In `how-wrong-fails.png` the truth itself has
+too few rays.
 """
 
 from __future__ import annotations
@@ -14,11 +14,14 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from images.layout import Layout, laid_out  # how the documentation's pictures are put together
+
 import rendergraph as rg
 from rendergraph import images
 
 Floats = npt.NDArray[np.float32]
-GAP = 4
+GAP = 8
 SHADOWS = {
     "shadow_map": "shadow-map",
     "shadow_pcf": "shadow-pcf",
@@ -94,28 +97,34 @@ def table(title: str, truth: Floats, found: dict[str, Floats], mask: npt.NDArray
         print(f"| `{name}` | {rmse:.4f} | {off.mean():+.4f} | {100 * far:.1f} % | {energy:.2f} |", flush=True)
 
 
-def columns(
-    panels: list[Floats],
+def sheet(
+    panels: dict[str, Floats],
     truth: Floats,
     mask: npt.NDArray[np.bool_],
     crop: tuple[int, int, int, int],
     enlarge: int,
     gain: float,
 ) -> npt.NDArray[np.uint8]:
-    """Return a sheet of parts with their errors beneath them; a part without an error is white."""
+    """Return parts of panels with their names, four in a row, and their errors below them; white is no error."""
     x, y, width, height = crop
     part = slice(y, y + height), slice(x, x + width)
-    rows: list[list[Floats]] = [[], []]
-    for panel in panels:
+    shown, wrong = [], []
+    for panel in panels.values():
         off = gain * ((panel - truth).mean(-1) * mask)[part]
         dark, bright = np.maximum(-off, 0), np.maximum(off, 0)
-        wrong = 1 - np.stack([bright, dark + bright, dark], -1)
-        shown = np.broadcast_to(panel[part], (height, width, 3)) ** np.float32(1 if panel.shape[-1] == 1 else 1 / 2.2)
-        for row, tile in zip(rows, (shown, wrong), strict=True):
-            tile = np.repeat(np.repeat(np.clip(tile, 0, 1), enlarge, 0), enlarge, 1)
-            row.append(np.pad(tile, ((0, GAP), (0, GAP), (0, 0)), constant_values=1))
-    sheet = np.vstack([np.hstack(row) for row in rows])[:-GAP, :-GAP]
-    return np.ascontiguousarray((sheet * 255 + 0.5).astype(np.uint8))
+        wrong.append(1 - np.stack([bright, dark + bright, dark], -1))
+        shown.append(
+            np.broadcast_to(panel[part], (height, width, 3)) ** np.float32(1 if panel.shape[-1] == 1 else 1 / 2.2)
+        )
+    columns = min(4, len(panels))
+    tiles, labels = [], []
+    for start in range(0, len(panels), columns):
+        names = list(panels)[start : start + columns]
+        blank = [np.ones((height, width, 3))] * (columns - len(names))
+        tiles += [*shown[start : start + columns], *blank, *wrong[start : start + columns], *blank]
+        labels += [*names, *[""] * (2 * columns - len(names))]
+    large = [np.repeat(np.repeat(np.clip(tile, 0, 1), enlarge, 0), enlarge, 1) for tile in tiles]
+    return laid_out([(tile * 255 + 0.5).astype(np.uint8) for tile in large], Layout(columns, GAP, labels))
 
 
 def shadows(session: rg.Session, folder: Path | None) -> None:
@@ -130,12 +139,20 @@ def shadows(session: rg.Session, folder: Path | None) -> None:
     if folder:
         fine, crop = Shots(session, "shadow_study", (640, 360)), (400, 215, 100, 80)
         mask, hard = fine.lit(), fine.draw("traced-shadows", port, "shadows.angle=0")
-        names = ("shadow_map", "shadow_pcf", "shadow_vsm", "shadow_esm", "shadow_msm", "shadow_convolution")
-        shown = [hard, *(fine.draw(SHADOWS[name], port) for name in names)]
-        images.write(folder / "how-wrong-shadows.png", columns(shown, hard, mask, crop, 2, 1))
+        names = (
+            "shadow_map",
+            "shadow_pcf",
+            "shadow_vsm",
+            "shadow_esm",
+            "shadow_msm",
+            "shadow_convolution",
+            "shadow_pcss",
+        )
+        shown = {"rays": hard, **{name: fine.draw(SHADOWS[name], port) for name in names}}
+        images.write(folder / "how-wrong-shadows.png", sheet(shown, hard, mask, crop, 3, 1))
         soft = fine.draw("traced-shadows", port, "shadows.samples=48")
-        shown = [soft, fine.draw("shadow-pcss", port), shown[2], shown[1]]
-        images.write(folder / "how-wrong-penumbra.png", columns(shown, soft, mask, crop, 3, 1))
+        shown = {"rays": soft, **{name: shown[name] for name in ("shadow_pcss", "shadow_pcf", "shadow_map")}}
+        images.write(folder / "how-wrong-penumbra.png", sheet(shown, soft, mask, crop, 3, 1))
     room = Shots(session, "lantern", (320, 180))
     traced = room.draw("shadow-cube", port, "shadows.type=traced_shadows")
     bulbs = {name: room.draw(pipeline, port) for name, pipeline in BULBS.items()}
@@ -154,12 +171,11 @@ def occlusion(session: rg.Session, folder: Path | None) -> None:
     table("Occlusion", exact, found, mask)
     if folder:
         crop = 70, 70, 60, 60
-        sheet = columns([exact, *found.values()], exact, mask, crop, 2, 4)
-        images.write(folder / "how-wrong-occlusion.png", sheet)
+        images.write(folder / "how-wrong-occlusion.png", sheet({"rays": exact, **found}, exact, mask, crop, 5, 4))
         rough = stairs.draw("traced-occlusion", "ao.occlusion", "ao.radius=1", "ao.samples=8")
-        parts = [columns([found["gtao"]], truth, mask, crop, 4, 4)[60 * 4 + GAP :] for truth in (exact, rough)]
-        gap = np.full((parts[0].shape[0], GAP, 3), 255, np.uint8)
-        images.write(folder / "how-wrong-fails.png", np.ascontiguousarray(np.hstack([parts[0], gap, parts[1]])))
+        parts = [sheet({"gtao": found["gtao"]}, truth, mask, crop, 8, 4)[60 * 8 + GAP :] for truth in (exact, rough)]
+        errors = laid_out(parts, Layout(2, GAP, ["against 256 rays", "against 8 rays"]))
+        images.write(folder / "how-wrong-fails.png", errors)
 
 
 def light(session: rg.Session, folder: Path | None) -> None:
@@ -171,8 +187,8 @@ def light(session: rg.Session, folder: Path | None) -> None:
     found = {name: box.draw(pipeline, port, "gi.samples=64")[..., :3] for name, pipeline in LIGHT.items()}
     table("Light between surfaces", exact, found, mask)
     if folder:
-        sheet = columns([exact, *found.values()], exact, mask, (62, 40, 64, 60), 2, 4)
-        images.write(folder / "how-wrong-light.png", sheet)
+        shown = sheet({"rays": exact, **found}, exact, mask, (62, 40, 64, 60), 5, 4)
+        images.write(folder / "how-wrong-light.png", shown)
 
 
 FAMILIES = {"shadows": shadows, "occlusion": occlusion, "light": light}
