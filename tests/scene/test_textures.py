@@ -118,6 +118,18 @@ def test_another_seed_is_another_pattern_and_the_same_is_the_same(
     assert (again["base_color"] == first).all()
 
 
+def test_no_course_of_bricks_lies_like_the_next(tmp_path: Path, generator: TextureGenerator) -> None:
+    """Also across the tile's edge, with an odd number of courses: their joints are apart by at least a quarter brick."""
+    material = "texture: {kind: bricks, rows: 5, columns: 2, resolution: 80, wear: 0, variation: 0, mortar: 0.03}"
+    slope = np.abs(
+        maps(generator, read(tmp_path, material))["normal"][8::16, :, 0] - 0.5
+    )  # in the middle of each course
+    edges = slope > 0.5 * slope.max()
+    assert edges.any(axis=1).all()
+    for number in range(5):
+        assert not (edges[number] & edges[(number + 1) % 5]).any(), number
+
+
 def test_maps_of_a_plugins_kind_have_their_closed_forms(
     tmp_path: Path, plugin: Path, generator: TextureGenerator, gl: rg.Session
 ) -> None:
