@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import mmap
 import os
-import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
+
+from rendergraph.system import set_alarm
 
 DRAW_TIMEOUT = "_RENDERGRAPH_DRAW_TIMEOUT"
 """The environment variable with the limit of `limited_draw`: worker processes inherit it."""
@@ -40,8 +41,8 @@ def limited_draw() -> Iterator[None]:
     if not (seconds := draw_seconds()):
         yield  # a timer may be the caller's
         return
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    set_alarm(seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
+        set_alarm(0)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
+import re
 import subprocess
 import sys
+import tarfile
+import tomllib
 import zipfile
 from collections.abc import Iterator
 from importlib.metadata import entry_points, version
@@ -102,9 +106,41 @@ def test_installed_names_lead_to_the_folders(folder: str) -> None:
     }
 
 
-def test_versions_agree() -> None:
-    import tomllib
+@pytest.mark.nightly
+def test_the_source_distribution_has_what_its_tests_need(tmp_path: Path) -> None:
+    """All that is in the repository but its list of ignored files, and the editor's and the server's own."""
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if listed.returncode != 0:
+        pytest.skip("no checkout, whose list of files is compared")
+    source = tmp_path / "source"
+    subprocess.run(["git", "clone", "--quiet", "--no-hardlinks", str(ROOT), str(source)], check=True)
+    program = f"from setuptools import build_meta; print(build_meta.build_sdist({str(tmp_path)!r}))"
+    done = subprocess.run([sys.executable, "-c", program], cwd=source, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    with tarfile.open(next(tmp_path.glob("*.tar.gz"))) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    wanted = {
+        name for name in listed.stdout.splitlines() if not name.startswith((".github/", ".devcontainer/", ".git"))
+    }
+    assert wanted - names == set()
 
+
+def test_an_index_shows_the_readmes_pictures_and_links(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    release = importlib.import_module("_generate.release")
+    found = release.absolute(
+        "[![a](docs/a.png)](docs/a.md) [b](#b) [c](https://d.e/f) `[x]`", "https://g.h/r", "v1.0.0"
+    )
+    expected = "[![a](https://g.h/r/raw/v1.0.0/docs/a.png)](https://g.h/r/blob/v1.0.0/docs/a.md) [b](#b) [c](https://d.e/f) `[x]`"
+    assert found == expected
+    readme = release.absolute((ROOT / "README.md").read_text(encoding="utf-8"), "https://g.h/r", "v1.0.0")
+    assert not re.findall(r"\]\((?!https?:|#)", readme)
+    project = tomllib.loads(release.with_urls((ROOT / "pyproject.toml").read_text(encoding="utf-8"), "https://g.h/r"))
+    assert project["project"]["urls"]["Issues"] == "https://g.h/r/issues"
+
+
+def test_versions_agree() -> None:
+    assert f"\nversion: {version('rendergraph')}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     import rendergraph
 
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]

@@ -11,7 +11,6 @@ import faulthandler
 import json
 import os
 import re
-import resource
 import select
 import signal
 import subprocess
@@ -30,6 +29,7 @@ from rendergraph.catalog.types import SHADERS
 from rendergraph.declare.blame import cause_chain, describe_error, source_location
 from rendergraph.errors import DeviceError, InputError, Place, Problem, RenderError, RendergraphError, shown_file
 from rendergraph.farm.worker_process import ChildProcess
+from rendergraph.system import limit_memory
 
 _ERRORS = {1: RenderError, 3: InputError, 5: DeviceError}
 _STARTUP_SECONDS = 20.0
@@ -196,9 +196,7 @@ def main(pipe: int, file: str, plugins: Sequence[str], scene: str | None, memory
     It announces each stage, so that the parent knows what was running when no more messages come; the fault handler
     writes the line to the file `trace`.
     """
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    # Private writable memory, and not the address space: drivers reserve much of that and use little.
-    resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+    limit_memory(memory)
     traces = open(trace, "wb", buffering=0)  # noqa: SIM115  # until the process ends
     faulthandler.enable(traces, all_threads=False)
     faulthandler.register(signal.SIGUSR1, traces, all_threads=False)

@@ -171,7 +171,9 @@ def main(args: Sequence[str]) -> int:
         return fail([Problem("RG509", error.strerror or str(error), where)], code, as_json)
     except BaseException as error:  # SystemExit in third-party code, too
         if isinstance(error, ImportError) and not is_framework(error.name or ""):
-            text = f"a library that rendergraph needs does not load: {error}; install it again"
+            missing = isinstance(error, ModuleNotFoundError) and (error.name or "").partition(".")[0]
+            fix = f"install it: pip install {missing}" if missing else "install it again"
+            text = f"a library that rendergraph needs does not load: {error}; {fix}"
             return fail([Problem("RG509", text)], 1, as_json)
         if os.environ.get("RENDERGRAPH_TRACEBACK"):
             raise

@@ -8,6 +8,7 @@ import re
 import sys
 from typing import Any
 
+from rendergraph import system
 from rendergraph.cli import options
 from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import emit, emit_json, table
@@ -95,17 +96,17 @@ def _packages() -> dict[str, str | None]:
 
 
 def _advice(found: dict[str, Any], devices: list[dict[str, Any]], packages: dict[str, str | None]) -> list[str]:
-    """One sentence for each thing to do; package names are those of Debian and Ubuntu."""
+    """One sentence for each thing to do."""
     advice = []
     missing = [name for name, version in packages.items() if version is None]
     if missing:
         advice.append(f"pip install {' '.join(missing)}")
     libraries = found.get("libraries", {})
-    apt = [p for library, p in (("libEGL.so.1", "libegl1"), ("libGL.so.1", "libgl1")) if libraries.get(library)]
+    lacking = [library for library in (system.EGL, system.GL) if libraries.get(library)]
     if not any(device["usable"] for device in devices):
-        apt.append("libgl1-mesa-dri")
-    if apt:
-        advice.append(f"apt install {' '.join(apt)}   (software rendering; or your GPU vendor's driver)")
+        lacking.append("driver")
+    if lacking:
+        advice.append(system.install_advice(lacking))
     broken = [device for device in devices if not device["usable"] and not device.get("software")]
     if broken:
         advice.append("update the driver of the device that cannot be used: OpenGL 4.5 is needed")

@@ -17,6 +17,7 @@ from rendergraph.activity import DRAW_TIMEOUT
 from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import emit, emit_json, warn
 from rendergraph.errors import InputError
+from rendergraph.system import STDIN
 
 if TYPE_CHECKING:
     from rendergraph.declare import Extensions
@@ -329,7 +330,7 @@ def selection_options(function: F) -> F:
         from rendergraph.session import Selection
 
         fields = {name: given.pop(name) for name in SELECTION_OPTIONS}
-        function(select=lambda name: Selection("/dev/stdin" if name == "-" else name, **fields), **given)
+        function(select=lambda name: Selection(STDIN if name == "-" else name, **fields), **given)
 
     return together(*SELECTION_OPTIONS.values())(selecting)  # type: ignore[return-value]
 

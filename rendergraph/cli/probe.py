@@ -11,13 +11,14 @@ import sys
 from typing import Any
 
 from rendergraph.gl.egl import devices
+from rendergraph.system import EGL, GL
 
 _STORED_BLOCKS = "a crash of this driver is avoided: more than two uniform blocks a stage are storage blocks"
 
 
 def libraries() -> dict[str, str | None]:
     found: dict[str, str | None] = {}
-    for name in ("libEGL.so.1", "libGL.so.1"):
+    for name in (EGL, GL):
         try:
             ctypes.CDLL(name)
             found[name] = None

@@ -13,11 +13,10 @@ import sys
 import time
 from collections.abc import Set as AbstractSet
 
-from rendergraph import activity
+from rendergraph import activity, system
 
 PATIENCE = 1.2
 """Seconds from a signal to the end: finished files are on the disk by then, and files appear whole or not at all."""
-_PR_SET_PDEATHSIG = 1
 
 
 def supervise() -> None:
@@ -34,12 +33,7 @@ def supervise() -> None:
     for number in ending:
         signal.signal(number, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {*ending, signal.SIGCHLD})
-    import ctypes  # takes 2 ms, in which Ctrl-C is already heard
-
-    # A supervisor that is killed takes the worker with it.
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != supervisor:
-        os._exit(1)
+    system.end_with_parent(supervisor)  # takes 2 ms, in which Ctrl-C is already heard
     activity.note("preparing")()
 
 

@@ -8,7 +8,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
@@ -25,6 +24,7 @@ from rendergraph.errors import Place, Problem, suggestion
 from rendergraph.installed import require, versions
 from rendergraph.metrics import Encoding, Metrics
 from rendergraph.session.frame import not_finite
+from rendergraph.system import processor
 
 if TYPE_CHECKING:
     from rendergraph.allocate import ResourcePlan
@@ -490,16 +490,7 @@ def machine() -> dict[str, str]:
     names = ("rendergraph", "moderngl", "numpy", "OpenImageIO")
     return {
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
-        "processor": _processor(),
+        "processor": processor(),
         "python": platform.python_version(),
         **{name: version or "" for name, version in versions(names).items()},
     }
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return platform.processor()
-    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return f"{models[0]}, {len(models)} logical cores" if models else platform.processor()

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import msgspec
 from msgspec import Meta, Struct, structs, to_builtins
 
-from rendergraph import metrics
+from rendergraph import metrics, system
 from rendergraph.compare.results import Result, typed_settings
 from rendergraph.compare.timing import NO_TIMES, PassTime, Spread, Times
 from rendergraph.errors import InputError, Place, Problem, RenderError
@@ -344,18 +344,14 @@ def _number(value: float | None) -> float:
 @contextlib.contextmanager
 def locked(out: Path) -> Iterator[None]:
     """Make the folder if it does not exist, and keep other sweeps out of it; the OS releases the lock on exit."""
-    import fcntl  # a sweep is read and checked on every system
-
     try:
         out.mkdir(parents=True, exist_ok=True)
         lock = (out / _LOCK).open("ab")
     except OSError as error:
         raise _refused(out, error.strerror or str(error)) from error
     with lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise _refused(out, "another sweep is running in it; wait until it ends, or use another folder") from None
+        if not system.lock(lock):
+            raise _refused(out, "another sweep is running in it; wait until it ends, or use another folder")
         yield
 
 

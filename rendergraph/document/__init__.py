@@ -26,6 +26,7 @@ from rendergraph.document.values import (
 )
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.stamps import record_read
+from rendergraph.system import STDIN
 
 
 def load(path: Path, *, limits: YamlLimits = YamlLimits(), keep_going: bool = False) -> Document:
@@ -73,7 +74,7 @@ def read_bytes(path: Path, most: int, name: str | None = None) -> bytes:
 
 def is_standard_input(name: str | Path | None) -> bool:
     """Whether a file that the user named is the process's standard input."""
-    return str(name) in ("-", "/dev/stdin")
+    return str(name) in ("-", STDIN)
 
 
 @lru_cache(maxsize=1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import json
 import os
 import pickle
@@ -17,6 +16,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rendergraph import system
 from rendergraph.errors import DeviceError, Problem, RenderError, RendergraphError
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ TIMEOUT = 600.0
 """Seconds without a message before a worker is replaced."""
 STARTUP_TIMEOUT = 30.0
 """Seconds until a worker is ready: the process starts, imports and opens its device, which takes about a second."""
-_PR_SET_PDEATHSIG = 1
 
 
 class ChildProcess:
@@ -49,8 +48,8 @@ class ChildProcess:
         call = {"path": sys.path, "arguments": {**arguments, "pipe": remote.fileno()}, "parent": os.getpid()}
         program = (
             "import json, sys; call = json.loads(sys.argv[1]); sys.path[:] = call['path']\n"
-            "from rendergraph.farm.worker_process import end_with\n"
-            f"end_with(call['parent'])\nfrom {module} import {function}\n{function}(**call['arguments'])"
+            "from rendergraph.system import end_with_parent\n"
+            f"end_with_parent(call['parent'])\nfrom {module} import {function}\n{function}(**call['arguments'])"
         )
         with remote:
             self.process = subprocess.Popen(
@@ -91,18 +90,9 @@ class ChildProcess:
         return f"exit code {code}"
 
     def kill(self) -> None:
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(self.process.pid, signal.SIGKILL)
+        system.kill_session(self.process.pid)
         self.process.wait()
         self.pipe.close()
-
-
-def end_with(parent: int) -> None:
-    """Let the system end this process when its parent ends, for whatever reason."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
-        os._exit(1)
 
 
 class WorkerProcess:

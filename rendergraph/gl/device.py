@@ -16,6 +16,7 @@ from msgspec import Struct, field
 from rendergraph.errors import DeviceError, Problem
 from rendergraph.gl.raw import RawGL
 from rendergraph.gl.saved_state import SavedState, settle
+from rendergraph.system import EGL, GL
 
 REQUIRED_VERSION = 450
 TIME_ELAPSED = 0x88BF
@@ -179,7 +180,7 @@ def open_device(index: int | None = None) -> Device:
             # By their names, which every Linux has: glcontext's own search starts two processes.
             names = {
                 "libgl": os.environ.get("GLCONTEXT_LINUX_LIBGL") or "libGL.so.1",
-                "libegl": os.environ.get("GLCONTEXT_LINUX_LIBEGL") or "libEGL.so.1",
+                "libegl": os.environ.get("GLCONTEXT_LINUX_LIBEGL") or EGL,
             }
             context = egl.create_context(mode="standalone", glversion=REQUIRED_VERSION, device_index=chosen, **names)
             ctx = moderngl.create_context(context=context)
@@ -214,7 +215,7 @@ def previous_context() -> Iterator[None]:
 def _egl() -> Any:
     """Return the functions about current contexts, None without EGL."""
     try:
-        egl = ctypes.CDLL("libEGL.so.1")
+        egl = ctypes.CDLL(EGL)
     except OSError:
         return None
     handle = ctypes.c_void_p
@@ -224,14 +225,14 @@ def _egl() -> Any:
 
 
 def _system_loader() -> Callable[[str], int]:
-    for library, name in (("libEGL.so.1", "eglGetProcAddress"), ("libGL.so.1", "glXGetProcAddressARB")):
+    for library, name in ((EGL, "eglGetProcAddress"), (GL, "glXGetProcAddressARB")):
         try:
             function = getattr(ctypes.CDLL(library), name)
         except (OSError, AttributeError):
             continue
         function.argtypes, function.restype = [ctypes.c_char_p], ctypes.c_void_p
         return lambda symbol: function(symbol.encode()) or 0
-    text = "neither libEGL.so.1 nor libGL.so.1 can be loaded; `rendergraph doctor` says more"
+    text = f"neither {EGL} nor {GL} can be loaded; `rendergraph doctor` says more"
     raise DeviceError(Problem("RG611", text))
 
 

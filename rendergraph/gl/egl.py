@@ -5,6 +5,8 @@ from __future__ import annotations
 import ctypes
 from typing import Any
 
+from rendergraph.system import EGL
+
 _VENDOR, _EXTENSIONS, _RENDERER, _DRM, _RENDER_NODE, _CUDA = 0x3053, 0x3055, 0x335F, 0x3233, 0x3377, 0x323A
 _MOST_DEVICES = 32
 
@@ -15,7 +17,7 @@ def devices() -> list[dict[str, Any]]:
     Raises:
         OSError: EGL is missing, or lists no devices.
     """
-    egl = ctypes.CDLL("libEGL.so.1")
+    egl = ctypes.CDLL(EGL)
     egl.eglGetProcAddress.restype = ctypes.c_void_p
     egl.eglGetProcAddress.argtypes = [ctypes.c_char_p]
 

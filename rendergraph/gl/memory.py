@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import ctypes
 import os
-from pathlib import Path
 
+from rendergraph import system
 from rendergraph.errors import Problem, RenderError, UsageError
 from rendergraph.gl.device import Device
 
 VARIABLE = "RENDERGRAPH_MEMORY_LIMIT"
 _NVX_CURRENT_AVAILABLE, _ATI_TEXTURE_FREE = 0x9049, 0x87FC
-_GROUP = Path("/sys/fs/cgroup")
 
 
 def check_memory(device: Device, needed: int, allowed: int | None = None) -> None:
@@ -29,7 +28,7 @@ def check_memory(device: Device, needed: int, allowed: int | None = None) -> Non
     if allowed is not None:
         limit, of = allowed << 20, ""
     else:
-        free = free_on_device(device) or free_on_machine()
+        free = free_on_device(device) or system.free_memory()
         if free is None:
             return
         limit = free * 3 // 4
@@ -56,30 +55,3 @@ def free_on_device(device: Device) -> int | None:
             if kibibytes[0] > 0:
                 return kibibytes[0] * 1024
     return None
-
-
-def free_on_machine() -> int | None:
-    """Return the bytes available to a process: reclaimable file cache counts, and so does a container's limit."""
-    return min((bytes for bytes in (_free_in_system(), _free_in_group()) if bytes is not None), default=None)
-
-
-def _free_in_system() -> int | None:
-    try:
-        with open("/proc/meminfo", encoding="ascii") as lines:
-            for line in lines:
-                if line.startswith("MemAvailable:"):
-                    return int(line.split()[1]) * 1024
-        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (ValueError, OSError):
-        return None
-
-
-def _free_in_group() -> int | None:
-    """Return what is left of a control group's memory (version 2), None if it has no limit."""
-    try:
-        bound = (_GROUP / "memory.max").read_text(encoding="ascii").strip()
-        used = int((_GROUP / "memory.current").read_text(encoding="ascii"))
-        cached = dict(line.split() for line in (_GROUP / "memory.stat").read_text(encoding="ascii").splitlines())
-        return None if bound == "max" else max(0, int(bound) - used + int(cached.get("inactive_file", 0)))
-    except (ValueError, OSError):
-        return None

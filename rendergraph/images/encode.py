@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import os
+import shutil
 import struct
 import warnings
 import zlib
@@ -14,6 +14,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from rendergraph import system
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.images.files import failed, staged
 from rendergraph.images.viewable import from_srgb, to_bytes, to_srgb
@@ -76,14 +77,8 @@ def write_all(jobs: Sequence[Job], metadata: Mapping[str, str]) -> None:
 
 def picture_bytes(job: Job, metadata: Mapping[str, str]) -> bytes:
     """Return the bytes of the file that `write_all` would write; nothing is left behind where the process is killed."""
-    if not hasattr(os, "memfd_create"):
-        import tempfile  # where there is no memory that a library can write to
-
-        with tempfile.NamedTemporaryFile() as named:
-            _write_job(job, Path(named.name), metadata)
-            return named.read()
-    with open(os.memfd_create("picture"), "rb") as file:
-        _write_job(job, Path(f"/proc/self/fd/{file.fileno()}"), metadata)
+    with system.memory_file() as (path, file):
+        _write_job(job, Path(path), metadata)
         return file.read()
 
 
@@ -199,17 +194,13 @@ def _safe_place(path: Path, part: Path) -> Iterator[str]:
     On a full disk the Radiance writer reports success and libjpeg ends the process, so these write to memory first;
     OpenEXR reports the failure. A picture whose name is not text is written to memory, too.
     """
-    if (path.suffix.lower() == ".exr" and is_text(str(part))) or not hasattr(os, "memfd_create"):
+    if path.suffix.lower() == ".exr" and is_text(str(part)):
         yield str(part)
         return
-    memory = os.memfd_create("picture")
-    try:
-        yield f"/proc/self/fd/{memory}"
-        with open(memory, "rb", closefd=False) as source, open(part, "wb") as target:
-            while bytes_read := source.read(1 << 20):
-                target.write(bytes_read)
-    finally:
-        os.close(memory)
+    with system.memory_file() as (name, source):
+        yield name
+        with open(part, "wb") as target:
+            shutil.copyfileobj(source, target, 1 << 20)
 
 
 def _png(pixels: npt.NDArray[np.uint8], texts: Mapping[str, str]) -> Iterator[bytes]:

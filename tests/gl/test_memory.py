@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 import rendergraph as rg
+from rendergraph import system
 from rendergraph.errors import RenderError, UsageError
-from rendergraph.gl import memory
-from rendergraph.gl.memory import check_memory, free_on_device, free_on_machine
+from rendergraph.gl.memory import check_memory, free_on_device
 
 MIB = 1 << 20
 
@@ -41,7 +41,7 @@ def test_the_driver_says_what_is_free_where_it_can() -> None:
 
 def test_what_the_device_has_counts_before_what_the_machine_has(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("RENDERGRAPH_MEMORY_LIMIT", raising=False)
-    monkeypatch.setattr(memory, "free_on_machine", lambda: 100 * MIB)
+    monkeypatch.setattr(system, "free_memory", lambda: 100 * MIB)
     small = device({"GL_NVX_gpu_memory_info"}, {0x9049: 8 * 1024})
     check_memory(small, 6 * MIB)
     with pytest.raises(RenderError, match=r"needs 7 MiB of textures, 6 MiB may be used, three quarters of the 8 MiB"):
@@ -52,7 +52,7 @@ def test_what_the_device_has_counts_before_what_the_machine_has(monkeypatch: pyt
 
 
 def test_an_option_counts_before_the_variable_and_both_before_what_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(memory, "free_on_machine", lambda: 1 * MIB)
+    monkeypatch.setattr(system, "free_memory", lambda: 1 * MIB)
     check_memory(device(), 50 * MIB, allowed=50)
     monkeypatch.setenv("RENDERGRAPH_MEMORY_LIMIT", "40")
     check_memory(device(), 40 * MIB)
@@ -65,15 +65,15 @@ def test_an_option_counts_before_the_variable_and_both_before_what_is_free(monke
 
 
 def test_a_containers_bound_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(memory, "_GROUP", tmp_path)
-    unbound = free_on_machine()
+    monkeypatch.setattr(system, "_CONTROL_GROUP", tmp_path)
+    unbound = system.free_memory()
     assert unbound is not None
     (tmp_path / "memory.max").write_text("3000000\n")
     (tmp_path / "memory.current").write_text("1000000\n")
     (tmp_path / "memory.stat").write_text("anon 700000\ninactive_file 200000\n")
-    assert free_on_machine() == 2_200_000
+    assert system.free_memory() == 2_200_000
     (tmp_path / "memory.max").write_text("max\n")
-    assert free_on_machine() != 2_200_000
+    assert system.free_memory() != 2_200_000
 
 
 def test_the_limit_of_a_pipeline(gl: rg.Session) -> None:
