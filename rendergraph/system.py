@@ -57,7 +57,7 @@ def limit_memory(private: int) -> None:
 
     The address space is not limited: drivers reserve much of that and use little.
     """
-    import resource
+    import resource  # not on every system
 
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_DATA, (private, private))
@@ -65,7 +65,7 @@ def limit_memory(private: int) -> None:
 
 def lock(file: IO[bytes]) -> bool:
     """Lock an open file for this process, until it is closed; whether no other process has it."""
-    import fcntl
+    import fcntl  # not on every system
 
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -78,7 +78,7 @@ def lock(file: IO[bytes]) -> bool:
 def memory_file() -> Iterator[tuple[str, IO[bytes]]]:
     """Yield a path for libraries to write to, and that file open to read; a killed process leaves nothing behind."""
     if not hasattr(os, "memfd_create"):
-        import tempfile
+        import tempfile  # takes 5 ms
 
         with tempfile.NamedTemporaryFile() as named:
             yield named.name, named.file

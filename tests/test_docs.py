@@ -89,8 +89,16 @@ def test_a_command_in_the_text_is_one(page: Path, command: str) -> None:
                 endpoint(linked.graph, tap.name)
 
 
+LONG_PAGES = {"compare.md", "laptop-to-cluster.md", "hybrid.md", "view.md", "own-data.md"}
+"""Pages whose commands take 5 seconds or more; README.md, the longest, stays in `make check`."""
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(page, marks=[pytest.mark.nightly] if page.name in LONG_PAGES else []) for page in PAGES],
+    ids=lambda page: str(page.relative_to(ROOT)),
+)
 def test_blocks_of_a_page(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], lent_gpu: None
 ) -> None:
@@ -170,7 +178,7 @@ def test_lines_of_the_geometry_guide_are_hidden_nowhere_in_sight(
     pipeline = rg.load(tmp_path / "wireframe.yaml", plugins=[tmp_path / "wireframe.py"], scene=scene, size=(320, 180))
     frame = pipeline.render(outputs=["radiance"], taps=["light.surface_depth"])
     drawn = frame["radiance"][..., 0] > 100  # of the output: that has the lines in it, too
-    seen = frame["light.surface_depth"][..., 0] > 0
+    seen = frame.arrays["light.surface_depth"][..., 0] > 0
     assert seen.sum() > 1000
     assert (seen & ~drawn).sum() == 0
     assert (drawn & ~seen).sum() == 0

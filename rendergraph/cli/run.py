@@ -281,7 +281,9 @@ def _draw(
     with films([target.path for target in moving], expanded.options.fps, expanded.options.frames[0]) as open_films:
         for done, frame in enumerate(stages.draw(expanded, gpu), start=1):
             files = [
-                images.Saved(images.numbered(t.path, frame.number), frame[t.name], frame.info(t.name), raw=t.is_tap)
+                images.Saved(
+                    images.numbered(t.path, frame.number), frame.arrays[t.name], frame.info(t.name), raw=t.is_tap
+                )
                 for t in pictures
             ]
             if sheet is not None:
@@ -289,7 +291,7 @@ def _draw(
             if files:
                 images.save_outputs(files, frame.metadata)
             for target in moving:
-                shown = images.viewable_as(frame[target.name], frame.info(target.name))
+                shown = images.viewable_as(frame.arrays[target.name], frame.info(target.name))
                 open_films[target.path].add(frame.number, shown)
             progress.clear()
             for file in files:

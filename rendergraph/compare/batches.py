@@ -113,7 +113,7 @@ def render_batch(gpu: Gpu, batch: Batch, frame: int) -> Iterator[tuple[int, dict
     rendered = stages.draw_last(batch.planned.for_frames(range(1, frame + 1), warm_up=False), gpu)  # not measured
     for place, number in enumerate(batch.numbers):
         own = f"{place}/"
-        yield number, {name.removeprefix(own): rendered[name] for name in rendered if name.startswith(own)}
+        yield number, {name.removeprefix(own): array for name, array in rendered.arrays.items() if name.startswith(own)}
 
 
 def measure_batch(

@@ -100,9 +100,9 @@ def displayed(gpu: Gpu, planned: Planned, light: Endpoint, pixels: Pixels, outpu
         tapped = stages.draw_last(
             stages.expand(planned.linked, RenderOptions(frames=frames, outputs=(), taps=taps)), gpu
         )
-        given |= {end: tapped[str(end)] for end in figures}
+        given |= {end: tapped.arrays[str(end)] for end in figures}
     linked = replace(planned.linked, graph=_with_given(graph, given))
-    return stages.draw_last(stages.expand(linked, RenderOptions(frames=frames, outputs=(output,))), gpu)[output]
+    return stages.draw_last(stages.expand(linked, RenderOptions(frames=frames, outputs=(output,))), gpu).arrays[output]
 
 
 def _ports(graph: Graph) -> nx.DiGraph[Endpoint]:

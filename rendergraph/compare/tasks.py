@@ -311,7 +311,7 @@ def first_difference(
         if node not in counterparts:
             continue
         for port in graph[node].node.outputs():
-            a, b = base.get(f"{counterparts[node]}.{port}"), variant.get(f"{node}.{port}")
+            a, b = base.arrays.get(f"{counterparts[node]}.{port}"), variant.arrays.get(f"{node}.{port}")
             if a is None or b is None or _same(a, b):
                 continue
             most, share = _amount(a, b)

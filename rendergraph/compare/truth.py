@@ -224,7 +224,7 @@ def _light(gpu: Gpu, planned: Planned, run: Run, frames: int = 1) -> Pixels:
     options = RenderOptions(frames=range(run.frame, last + 1), still=run.frame, outputs=(LIGHT,))
     total: Any = 0.0
     for frame in stages.draw(stages.expand(linked, options), gpu):
-        total = total + colors(frame[LIGHT])
+        total = total + colors(frame.arrays[LIGHT])
     return np.asarray(total / frames)
 
 

@@ -76,7 +76,7 @@ class FrameChunk(Task):
 
 
 def _encode(frame: Frame, file: FrameFile) -> bytes | npt.NDArray[Any]:
-    pixels, info = frame[file.name], frame.info(file.name)
+    pixels, info = frame.arrays[file.name], frame.info(file.name)
     if not file.suffix:
         return viewable_as(pixels, info)
     return encoded(Saved(Path(f"frame{file.suffix}"), pixels, info, raw=file.raw), frame.metadata)

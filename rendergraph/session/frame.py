@@ -84,13 +84,15 @@ _BLACK, _CLIPPED = 5, 254
 class Frame(Mapping[str, npt.NDArray[Any]]):
     """A rendered frame; `frame["image"]` is an array with the top row first.
 
-    Arrays are (height, width, channels), preceded by layers if the texture has several: uint8 for 8-bit formats,
-    float32 for all other colours and depth, 32-bit integers for integer formats.
+    Arrays are (height, width, channels), preceded by layers if the texture has several, and without the last axis if it
+    has one channel: uint8 for 8-bit formats, float32 for all other colours and depth, 32-bit integers for integer
+    formats.
 
     Attributes:
         number: frame number, from 1.
         pipeline: the pipeline's name.
         size: width and height.
+        arrays: the same with all axes, also those of one layer or one channel.
         device: the GL device.
         types: the rendering nodes and their types, in order.
         memory: the plan's figures.
@@ -120,7 +122,10 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         if name not in self.arrays:
             raise KeyError(f"no output '{name}'{suggestion(name, self.arrays)}; render(taps=['NODE.PORT']) adds ports")
-        return self.arrays[name]
+        array = self.arrays[name]
+        if array.ndim == 4 and len(array) == 1:
+            array = array[0]
+        return array[..., 0] if array.ndim >= 3 and array.shape[-1] == 1 else array
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.arrays)
@@ -238,7 +243,7 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
         """
         from rendergraph.images import shown
 
-        array, info = self[name], self.infos[name]
+        array, info = self.arrays[name], self.infos[name]
         part = {"layer": layer, "channel": channel, "low": low, "high": high}
         return shown(array, name, info.semantic, info.encoding, **part)  # type: ignore[arg-type]
 

@@ -335,7 +335,7 @@ class Pipeline:
             report_progress(progress, "frames") as tell,
         ):
             for done, frame in enumerate(stages.draw(expanded, gpu), start=1):
-                made[path].add(frame.number, images.viewable_as(frame["image"], frame.info("image")))
+                made[path].add(frame.number, images.viewable_as(frame.arrays["image"], frame.info("image")))
                 tell(done, len(numbers))
         return path
 

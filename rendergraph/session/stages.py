@@ -286,7 +286,7 @@ def not_finite_warnings(frame: Frame, expanded: Expanded, gpu: Gpu, camera: Came
     return [
         problem.relocate(problem.place, hint=hint)
         for name, problem in frame.unsound.items()
-        if held or frame[name].dtype != "uint8"  # else it is a color like any other
+        if held or frame.arrays[name].dtype != "uint8"  # else it is a color like any other
     ]
 
 

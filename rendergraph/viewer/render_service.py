@@ -61,7 +61,7 @@ class _Rendered:
 
     @property
     def pixels(self) -> Pixels:
-        return self.frame[self.name]
+        return self.frame.arrays[self.name]
 
     @property
     def info(self) -> OutputInfo:
@@ -246,7 +246,7 @@ class RenderService:
         frame = self._draw(self._expanded[key], last).frame
         textures = {port: frame.info(port) for port in ports if frame.info(port).kind != "buffer"}
         files = {
-            port: self._encode(_subsample(images.viewable_as(frame[port], info)), ".png")
+            port: self._encode(_subsample(images.viewable_as(frame.arrays[port], info)), ".png")
             for port, info in textures.items()
         }
         return Response({"revision": self._revision}, files)

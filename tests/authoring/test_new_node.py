@@ -43,8 +43,8 @@ def commands_of(made: NewNode, where: Path) -> tuple[Path, list[str]]:
     return where.joinpath(*folders), [line for line in made.commands if not line.startswith(("cd ", "pip "))]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["fullscreen", pytest.param("compute", marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("kind", ["fullscreen", "compute"])
 def test_the_commands_it_prints_work_as_typed(kind: Any, tmp_path: Path) -> None:
     where, commands = commands_of(new_node("lens_falloff", kind, package=True, where=tmp_path), tmp_path)
     for command in commands:
@@ -54,7 +54,7 @@ def test_the_commands_it_prints_work_as_typed(kind: Any, tmp_path: Path) -> None
     assert (where / "lens_falloff.png").stat().st_size > 1000
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_everything_works_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every template, in place and as a package: pictures, checks, tests, lint and types, of all together."""
     for kind in KINDS:

@@ -129,7 +129,7 @@ def test_a_shader_of_its_own_takes_in_what_lies_beside_those_of_the_base(gl: rg.
     (tmp_path / "open.frag").write_text(OPEN_SHADER)
     pipeline = rg.load("ssao-hbao", sets=["ao.type=open"], plugins=[tmp_path / "open.py"], size=(16, 12))
     frame = gl.render(pipeline.set("ao.radius", 1e6), outputs=[], taps=["ao.occlusion"])
-    np.testing.assert_array_equal(frame["ao.occlusion"], 1.0)
+    np.testing.assert_array_equal(frame.arrays["ao.occlusion"], 1.0)
     assert examine(find_node(tmp_path / "open.py")).problems == ()
 
 

@@ -150,9 +150,9 @@ keyframes:
     for frame, share in zip(frames, (0.0, 0.5, 1.0), strict=True):
         np.testing.assert_allclose(frame["tints"][0, 0, :3], share * np.array([4, 8, 12]))
         np.testing.assert_allclose(frame["tints"][0, 1, :3], [1, 0.5, 0.25])
-        np.testing.assert_allclose(frame["lens"].ravel(), [0.1 + 0.4 * share, 0.02], rtol=1e-6)
-        np.testing.assert_allclose(frame["phases"].ravel(), [2, share, share])
-        height = frame["height"].reshape(2, 3)[::-1]  # a frame begins at the top, a texture at row 0
+        np.testing.assert_allclose(frame.arrays["lens"].ravel(), [0.1 + 0.4 * share, 0.02], rtol=1e-6)
+        np.testing.assert_allclose(frame.arrays["phases"].ravel(), [2, share, share])
+        height = frame.arrays["height"].reshape(2, 3)[::-1]  # a frame begins at the top, a texture at row 0
         np.testing.assert_allclose(height, np.arange(6).reshape(2, 3) / 5, atol=1e-6)
 
 

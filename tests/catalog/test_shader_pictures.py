@@ -48,7 +48,7 @@ def drawn(gl: rg.Session, folder: Path, files: Mapping[str, str], output: str = 
     for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")
     frame = rg.load(folder / "p.yaml", size=SIZE).render(session=gl)
-    return np.asarray(frame[output], np.float32)[::-1]
+    return np.asarray(frame.arrays[output], np.float32)[::-1]
 
 
 def pipeline(effect: str, port: str, more: str = "") -> str:

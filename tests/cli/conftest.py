@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -99,9 +100,7 @@ class FakeFrame:
         self.warnings: tuple[Any, ...] = ()
         self.unsound: dict[str, Any] = {}
         self.badly_exposed: dict[str, str] = {}
-
-    def __getitem__(self, name: str) -> Any:
-        return np.full((4, 6, 4), self.number / 10, np.float32)
+        self.arrays = defaultdict[str, Any](lambda: np.full((4, 6, 4), number / 10, np.float32))
 
     def info(self, name: str) -> Any:
         if name == "image":

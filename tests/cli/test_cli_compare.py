@@ -402,7 +402,7 @@ def test_variants_and_ports_that_cannot_be_are_told(cli: Any, words: list[str], 
 def test_any_port_is_measured(cli: Any, gl: rg.Session, tmp_path: Path) -> None:
     size = (32, 18)
     names = ("ssao-hemisphere", "ssao-disc")
-    one, other = (gl.render(name, size, taps="ao.occlusion")["ao.occlusion"] for name in names)
+    one, other = (gl.render(name, size, taps="ao.occlusion").arrays["ao.occlusion"] for name in names)
     told = cli("compare", *names, "--metric", "ao.occlusion", "--size", "32x18", "-n", "1", "--json").json
     expected = np.sqrt(np.mean((one.astype(float) - other) ** 2))
     assert told["metric"] == "ao.occlusion"

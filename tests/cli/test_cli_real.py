@@ -39,10 +39,15 @@ def has_no_end(words: list[str]) -> bool:
     return "--watch" in words or (words[0] == "view" and "--export" not in words)
 
 
-LONG = ("view", "sweep", "farm", "compare", "check-node", "run", "doctor", "bench")  # their examples take seconds
+LONG = ("view", "farm", "check-node", "run", "doctor", "bench")  # their examples take seconds
+LONGER = ("sweep", "compare")  # and theirs ten; README and guide run these verbs, too
 
 
-@pytest.mark.parametrize("verb", ["", *(pytest.param(v, marks=pytest.mark.slow if v in LONG else ()) for v in VERBS)])
+def marks_of(verb: str) -> list[pytest.MarkDecorator]:
+    return [pytest.mark.nightly] if verb in LONGER else [pytest.mark.slow] if verb in LONG else []
+
+
+@pytest.mark.parametrize("verb", ["", *(pytest.param(v, marks=marks_of(v)) for v in VERBS)])
 def test_the_examples_of_the_help_work(cli: Any, tmp_path: Path, verb: str) -> None:
     if verb == "config":
         assert cli("run", "forward", *SMALL).code == 0
@@ -376,7 +381,10 @@ def test_doctor_survives_a_broken_driver(
 
     run = subprocess.run
     monkeypatch.setattr(doctor, "_SECONDS", 1)
-    monkeypatch.setattr(subprocess, "run", lambda words, **rest: run([sys.executable, *instead], **rest))
+    broken = [sys.executable, *instead]
+    monkeypatch.setattr(
+        subprocess, "run", lambda words, **rest: run(broken if "rendergraph.cli.probe" in words else words, **rest)
+    )
     result = cli("doctor", "--json")
     assert result.code == 5
     assert result.json["problem"] == problem

@@ -336,6 +336,7 @@ def cluster(processes: Cluster) -> Cluster:
     return processes
 
 
+@pytest.mark.nightly
 def test_64_variants_are_the_same_by_dask_though_a_worker_is_killed_and_no_disk_is_shared(
     base: rg.Pipeline, gl: rg.Session, cluster: Cluster, tmp_path: Path
 ) -> None:

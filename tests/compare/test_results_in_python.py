@@ -113,7 +113,7 @@ def test_no_library_for_results_is_imported_before_it_is_used() -> None:
 def test_a_texture_is_shown_in_false_colours_with_a_scale(gl: rg.Session, tmp_path: Path) -> None:
     frame = gl.render("forward", SIZE, taps=["sun.shadow_map", "light.radiance"])
     shown = frame.show("sun.shadow_map", layer=0)
-    values = frame["sun.shadow_map"]
+    values = frame.arrays["sun.shadow_map"]
     assert (shown.low, shown.high) == (float(values.min()), float(values.max()))
     assert shown.pixels.shape[-1] == 3
     html = shown._repr_html_()

@@ -77,8 +77,8 @@ def test_compute_writes_what_later_steps_read_in_every_frame(draw: Draw) -> None
 outputs: {image: show.color, board: checker.board}"""
     frame = draw(text, Checker, Count, Show, shaders=SHADERS, frames=range(1, 4), size=(17, 9))
     np.testing.assert_array_equal(frame["image"][0, 0], [77, 76])
-    assert frame["board"][-1, 0, 0] == 0
-    assert frame["board"][-1, 1, 0] == 1
+    assert frame.arrays["board"][-1, 0, 0] == 0
+    assert frame.arrays["board"][-1, 1, 0] == 1
 
 
 def test_buffers_are_cleared_without_waiting_for_who_reads_them(draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -123,7 +123,7 @@ QUADS = {
 def test_a_draw_over_a_buffer_that_update_writes_each_frame(draw: Draw) -> None:
     text = "nodes: {q: {type: quads, params: {half: 0.25}}}\noutputs: {image: q.color}"
     for frames, share in ((range(1, 2), 1 / 16), (range(1, 3), 1 / 4)):
-        assert draw(text, Quads, shaders=QUADS, size=(16, 16), frames=frames)["image"].mean() == share
+        assert draw(text, Quads, shaders=QUADS, size=(16, 16), frames=frames).arrays["image"].mean() == share
 
 
 def test_an_update_that_writes_too_much_is_named(draw: Draw) -> None:
@@ -157,9 +157,9 @@ def test_a_draw_whose_count_a_compute_shader_decides(draw: Draw) -> None:
         "points.vert": """void main() { gl_PointSize = 1.0;
             gl_Position = vec4((float(gl_VertexID) + 0.5) / 8.0 - 1.0, 1.0 / 8.0 - 1.0, 0.0, 1.0); }""",
     }
-    image = draw("nodes: {i: {type: indirect}}\noutputs: {image: i.color}", Indirect, shaders=shaders, size=(16, 8))[
-        "image"
-    ]
+    image = draw(
+        "nodes: {i: {type: indirect}}\noutputs: {image: i.color}", Indirect, shaders=shaders, size=(16, 8)
+    ).arrays["image"]
     assert image.sum() == 5
 
 
@@ -184,7 +184,7 @@ def test_a_draw_takes_one_of_several_commands(draw: Draw) -> None:
             gl_Position = vec4((float(gl_VertexID) + 0.5) / 8.0 - 1.0, 1.0 / 8.0 - 1.0, 0.0, 1.0); }""",
     }
     image = draw("nodes: {c: {type: commands}}\noutputs: {image: c.color}", Commands, shaders=shaders, size=(16, 8))
-    assert np.flatnonzero(image["image"][-1, :, 0]).tolist() == [0, 1, 6, 7, 8]
+    assert np.flatnonzero(image.arrays["image"][-1, :, 0]).tolist() == [0, 1, 6, 7, 8]
 
 
 class Fill(Node):
@@ -228,8 +228,8 @@ outputs: {image: one.color, other: two.color}"""
     plan = pipeline.plan()
     assert plan.placement["a.values"] == plan.placement["b.values"]
     frame = bench.session.render(pipeline)
-    assert (frame["image"] == 1).all()
-    assert (frame["other"] == 2).all()
+    assert (frame.arrays["image"] == 1).all()
+    assert (frame.arrays["other"] == 2).all()
 
 
 class Redrawn(Node):
@@ -267,8 +267,8 @@ def test_a_compute_shader_sees_what_was_drawn_last(bench: Any) -> None:
     }
     text = "nodes: {r: {type: redrawn}}\noutputs: {image: r.color, first: r.first}"
     for frame in bench.frames(text, Redrawn, shaders=shaders, size=(64, 64), frames=range(1, 9)):
-        assert (frame["first"] == 1).all()
-        assert (frame["image"] == 2).all()
+        assert (frame.arrays["first"] == 1).all()
+        assert (frame.arrays["image"] == 2).all()
 
 
 class Filled(Node):
@@ -290,7 +290,7 @@ def test_one_barrier_stands_between_two_steps_that_store(bench: Any) -> None:
         barrier = bench.session.device.raw.glMemoryBarrier
         flat = [getattr(call, "func", None) is barrier for step in steps for call in step.calls]
     assert [len(list(run)) for is_barrier, run in groupby(flat) if is_barrier] == [1, 1, 1]
-    assert (bench.session.render(pipeline)["image"] == 2).all()
+    assert (bench.session.render(pipeline).arrays["image"] == 2).all()
 
 
 class Seeded(Node):
@@ -319,7 +319,7 @@ def test_a_buffer_that_update_fills_and_a_step_changes_is_never_shared(bench: An
     plan = pipeline.plan()
     assert plan.placement["a.number"] != plan.placement["b.number"]
     frame = bench.session.render(pipeline, frames=range(1, 4))
-    assert frame["image"].mean() == frame["other"].mean() == 6.0
+    assert frame.arrays["image"].mean() == frame.arrays["other"].mean() == 6.0
 
 
 class Offers(Node):
@@ -353,4 +353,4 @@ def test_a_function_reads_what_only_update_writes(draw: Draw) -> None:
         "takes.frag": "out float color; void main() { color = level(1); }",
     }
     text = "nodes: {o: {type: offers}, t: {type: takes, inputs: {level: o.level}}}\noutputs: {image: t.color}"
-    assert draw(text, Offers, Takes, shaders=shaders)["image"].max() == 4
+    assert draw(text, Offers, Takes, shaders=shaders).arrays["image"].max() == 4

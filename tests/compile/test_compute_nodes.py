@@ -118,7 +118,7 @@ def test_layers_are_covered_too_and_parts_are_flat(author: Any, gl: rg.Session) 
         (16, 8, 3),
         (8, 4, 1),
     ]
-    found = gl.render(pipeline)["image"]
+    found = gl.render(pipeline).arrays["image"]
     np.testing.assert_array_equal(found[:, 0, 0, 0], [10, 11, 12])
     assert {int(value) for value in np.unique(found)} == {10, 11, 12}
 
@@ -218,7 +218,7 @@ def test_ping_pong_between_two_internals(author: Any, gl: rg.Session, iterations
     )
     text = "nodes:\n  c: {type: checks}\n  a: {type: wrong, inputs: {source: c.color}}\noutputs: {image: a.color}\n"
     pipeline = author.pipeline(text).set("a.iterations", iterations)
-    assert gl.render(pipeline)["image"].mean() == 2.0**iterations
+    assert gl.render(pipeline).arrays["image"].mean() == 2.0**iterations
     plan = pipeline.plan()
     resources = {name for name in plan.placement if name.startswith("a.")}
     assert resources == {"a.color", "a.one", "a.other"} - ({"a.one", "a.other"} if iterations == 1 else set()) - (
@@ -266,7 +266,7 @@ def test_a_mip_chain_down_and_up_again(author: Any, gl: rg.Session) -> None:
         "  b: {type: wrong, inputs: {source: a.color}}\noutputs: {image: b.color}\n"
     )
     pipeline = author.pipeline(text)
-    np.testing.assert_array_equal(gl.render(pipeline)["image"], np.full((8, 16, 1), 0.5, np.float32))
+    np.testing.assert_array_equal(gl.render(pipeline).arrays["image"], np.full((8, 16, 1), 0.5, np.float32))
     plan = pipeline.plan()
     assert plan.placement["a.chain"] == plan.placement["b.chain"]
     assert plan.placement["c.color"] == plan.placement["a.color"]

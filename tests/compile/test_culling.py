@@ -134,7 +134,7 @@ BELOW = (
 
 def test_what_a_shader_moves_elsewhere_is_drawn_from_wherever_it_stands(bench: Any) -> None:
     text = "nodes: {h: {type: hoisted}}\noutputs: {depth: h.depth}"
-    assert bench.draw(text, Hoisted, shaders=UP, scene=BELOW, size=(8, 8))["depth"].max() > 0
+    assert bench.draw(text, Hoisted, shaders=UP, scene=BELOW, size=(8, 8)).arrays["depth"].max() > 0
 
 
 def test_commands_are_written_only_where_others_are_drawn(gl: Any, tmp_path: Path) -> None:

@@ -150,10 +150,10 @@ def test_several_targets_go_to_outputs_by_name(draw: Draw) -> None:
     }
     both = draw("nodes: {s: {type: split}}\noutputs: {image: s.first, radiance: s.second}", Split, shaders=shaders)
     assert np.all(both["image"] == 1.0)
-    assert both["radiance"].shape == (8, 16, 1)
-    assert np.all(both["radiance"] == 2.0)
+    assert both.arrays["radiance"].shape == (8, 16, 1)
+    assert np.all(both.arrays["radiance"] == 2.0)
     one = draw("nodes: {s: {type: split}}\noutputs: {image: s.second}", Split, shaders=shaders)
-    assert np.all(one["image"] == 2.0)
+    assert np.all(one.arrays["image"] == 2.0)
     assert one.memory["allocated_bytes"] == 16 * 8 * 4  # the target that nobody reads is not made
 
 

@@ -74,7 +74,7 @@ BOXES = (
 )
 def test_a_step_draws_the_objects_it_names(draw: Draw, objects: Any, seen: set[int]) -> None:
     text = f"nodes: {{i: {{type: ids, params: {{objects: {json.dumps(objects)}}}}}}}\noutputs: {{image: i.color}}"
-    image = draw(text, Ids, shaders=SHADERS, scene=BOXES, size=(16, 16))["image"]
+    image = draw(text, Ids, shaders=SHADERS, scene=BOXES, size=(16, 16)).arrays["image"]
     assert {int(value) for value in np.unique(image)} == seen
     if objects == "all":
         assert image[8, 4, 0] == 3  # nearest wins, whatever the order of drawing
@@ -105,15 +105,19 @@ OPAQUE = BOXES.replace("alpha_mode: blend", "roughness: 1")
 def test_what_would_draw_nothing_onto_a_picture_is_left_out_and_said(draw: Draw) -> None:
     text = "nodes: {i: {type: ids}, o: {type: over, inputs: {picture: i.color}}}\noutputs: {image: o.picture}"
     frame = draw(text, Ids, Over, shaders=OVER, scene=OPAQUE, size=(16, 16))
-    assert set(np.unique(frame["image"])) == {1, 2, 3}
+    assert set(np.unique(frame.arrays["image"])) == {1, 2, 3}
     assert frame.culled == {"o": "the scene has no transparent objects: there is nothing to draw"}
-    assert set(np.unique(draw(text, Ids, Over, shaders=OVER, scene=BOXES, size=(16, 16))["image"])) == {1, 2, 102}
+    assert set(np.unique(draw(text, Ids, Over, shaders=OVER, scene=BOXES, size=(16, 16)).arrays["image"])) == {
+        1,
+        2,
+        102,
+    }
 
 
 def test_what_begins_a_picture_is_drawn_even_if_empty(draw: Draw) -> None:
     """Somebody must fill it with what it first holds."""
     text = "nodes: {o: {type: over}}\noutputs: {image: o.picture}"
-    assert np.all(draw(text, Over, shaders=OVER, scene=OPAQUE, size=(16, 16))["image"] == 7.0)
+    assert np.all(draw(text, Over, shaders=OVER, scene=OPAQUE, size=(16, 16)).arrays["image"] == 7.0)
 
 
 class Behind(Node):
@@ -168,7 +172,7 @@ def test_a_continued_texture_brings_its_view(draw: Draw) -> None:
     scene = CAMERA + "objects: {box: {shape: box, size: [1, 1, 1], at: [0, 0, 10]}}\n"  # behind the camera
     nodes = "b: {type: back}, t: {type: through, inputs: {view: b.views}}, o: {type: onto, inputs: {depth: t.depth}}"
     once, twice = (
-        draw(f"nodes: {{{nodes}}}\noutputs: {{depth: {end}}}", Back, Through, Onto, scene=scene)["depth"]
+        draw(f"nodes: {{{nodes}}}\noutputs: {{depth: {end}}}", Back, Through, Onto, scene=scene).arrays["depth"]
         for end in ("t.depth", "o.depth")
     )
     assert once.max() > 0.0
@@ -179,7 +183,7 @@ def test_a_node_that_makes_nothing_but_views_is_updated(draw: Draw) -> None:
     scene = CAMERA + "objects: {box: {shape: box, size: [1, 1, 1], at: [0, 0, 10]}}\n"  # behind the camera
     text = "nodes: {b: {type: back}, t: {type: through, inputs: {view: b.views}}}\noutputs: {depth: t.depth}"
     frame = draw(text, Back, Through, scene=scene)
-    assert frame["depth"].max() > 0.0
+    assert frame.arrays["depth"].max() > 0.0
     assert frame.culled == {}
 
 
@@ -205,7 +209,7 @@ def test_a_depth_is_tested_that_another_step_samples_and_brings_its_view(draw: D
         "shown.frag": "uniform sampler2D depth; out float color; "
         "void main() { color = -texelFetch(depth, ivec2(gl_FragCoord.xy), 0).r; }"
     }
-    image = draw(text, Turned, Behind, shaders=shaders, scene=BOXES, size=(16, 16))["image"][..., 0]
+    image = draw(text, Turned, Behind, shaders=shaders, scene=BOXES, size=(16, 16)).arrays["image"][..., 0]
     assert np.all(image[:, :8] == 2)
     assert np.all((image[:, 8:] < 0) & (image[:, 8:] > -1))
 
@@ -241,13 +245,13 @@ def _triangles(folder: Path, **material: Any) -> None:
 def test_back_faces_of_single_sided_materials_are_culled_and_mirrors_turn_the_winding(bench: Any) -> None:
     pipeline = bench.pipeline(TEXT, Ids, shaders=SHADERS, size=(48, 16))
     _triangles(bench.folder)
-    image = bench.session.render(pipeline.with_scene(bench.folder / "t.gltf"))["image"][..., 0]
+    image = bench.session.render(pipeline.with_scene(bench.folder / "t.gltf")).arrays["image"][..., 0]
     assert image[12, 3] == 1
     assert image[12, 19] == 0
     assert image[12, 44] == 3
     _triangles(bench.folder, doubleSided=True)
     again = bench.pipeline(TEXT, Ids, shaders=SHADERS, size=(48, 16)).with_scene(bench.folder / "t.gltf")
-    assert bench.session.render(again)["image"][12, 19, 0] == 2
+    assert bench.session.render(again).arrays["image"][12, 19, 0] == 2
 
 
 class Wound(Node):
@@ -289,7 +293,7 @@ def test_a_geometry_shader_that_winds_by_itself_says_what_a_front_is(bench: Any,
     text = f"nodes: {{w: {{type: wound, params: {{front: {front}}}}}}}\noutputs: {{image: w.color}}"
     pipeline = bench.pipeline(text, Wound, shaders=WOUND, size=(48, 16))
     _triangles(bench.folder)
-    image = bench.session.render(pipeline.with_scene(bench.folder / "t.gltf"))["image"][..., 0]
+    image = bench.session.render(pipeline.with_scene(bench.folder / "t.gltf")).arrays["image"][..., 0]
     assert [image[12, column] for column in (3, 19, 44)] == shown
 
 
@@ -369,7 +373,7 @@ def test_ten_objects_and_a_thousand_take_the_same_calls(bench: Any) -> None:
         frame = bench.session.render(bench.pipeline(TEXT, Ids, shaders=SHADERS, scene=_grid(count), size=(64, 64)))
         executable = bench.session.cache.active
         calls.append([len(step.calls) for step in executable.lists[0]])
-        assert len(np.unique(frame["image"])) > 10
+        assert len(np.unique(frame.arrays["image"])) > 10
     assert calls[0] == calls[1]
 
 

@@ -120,7 +120,7 @@ def test_a_wire_frame_by_a_geometry_shader(author: Any, gl: rg.Session) -> None:
     author.node(WIRES)
     author.write(wrong__geom=GEOM, wrong__frag=WIRE_FRAG)
     (author.folder / "quad.obj").write_text(PLAIN)
-    image = gl.render(author.pipeline(scene=SCENE, size="[64, 64]"))["image"][..., 0]
+    image = gl.render(author.pipeline(scene=SCENE, size="[64, 64]")).arrays["image"][..., 0]
     assert image[0].min() == image[63].min() == image[:, 0].min() == image[:, 63].min() == 1  # the square's sides
     assert np.fliplr(image).diagonal().min() == 1  # and its diagonal
     assert image[10:25, 10:25].max() == image[40:55, 40:55].max() == 0  # not what lies between
@@ -131,7 +131,7 @@ def test_a_wire_frame_by_state(author: Any, gl: rg.Session) -> None:
     author.write(wrong__frag="uniform float thickness;\nout float color;\nvoid main() { color = thickness; }")
     (author.folder / "quad.obj").write_text(PLAIN)
     scene = SCENE.replace("height: 2", "height: 3")
-    image = gl.render(author.pipeline(scene=scene, size="[64, 64]"))["image"][..., 0]
+    image = gl.render(author.pipeline(scene=scene, size="[64, 64]")).arrays["image"][..., 0]
     assert 0 < image.sum() < 64 * 5
 
 
@@ -160,7 +160,7 @@ def test_a_draw_over_a_buffer_that_another_node_filled(author: Any, gl: rg.Sessi
         wrong__frag="out float color;\nvoid main() { color = 1.0; }",
     )
     text = "nodes:\n  m: {type: made}\n  a: {type: wrong, inputs: {corners: m.corners}}\noutputs: {image: a.color}\n"
-    assert gl.render(author.pipeline(text))["image"].min() == 1
+    assert gl.render(author.pipeline(text)).arrays["image"].min() == 1
 
 
 LIMITS = {

@@ -42,13 +42,13 @@ def test_it_is_drawn_where_any_sample_passed_and_its_target_is_cleared_anyway(
     text = TEXT.replace("peels}", f"peels, params: {{height: {height}}}}}")
     for options in ({}, {"poison": True}, {"frames": range(1, 4)}):
         frame = draw(text, Peels, shaders=SHADERS, **options)
-        np.testing.assert_array_equal(frame["image"], expected)
+        np.testing.assert_array_equal(frame.arrays["image"], expected)
 
 
 def test_what_has_changed_since_is_asked_anew(bench: Any) -> None:
     pipeline = bench.pipeline(TEXT, Peels, shaders=SHADERS)
     for height, expected in ((9, 7), (0, 5), (9, 7)):
-        assert bench.session.render(pipeline.set("a.height", height))["image"].mean() == expected
+        assert bench.session.render(pipeline.set("a.height", height)).arrays["image"].mean() == expected
 
 
 @pytest.mark.parametrize("method", ["stop", "end_conditional"])
@@ -65,7 +65,8 @@ def test_what_is_broken_off_leaves_nothing_out_later(bench: Any, monkeypatch: py
     with pytest.raises(KeyboardInterrupt):
         bench.draw(TEXT, Peels, shaders=SHADERS)
     assert (
-        bench.draw(TEXT.replace("peels}", "peels, params: {height: 9}}"), Peels, shaders=SHADERS)["image"].mean() == 7
+        bench.draw(TEXT.replace("peels}", "peels, params: {height: 9}}"), Peels, shaders=SHADERS).arrays["image"].mean()
+        == 7
     )
 
 

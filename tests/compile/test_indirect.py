@@ -101,7 +101,7 @@ def test_a_shader_decides_how_much_is_dispatched_and_drawn(bench: Any, gl: rg.Se
         assert not heights[len(kept) :].any()
         drawn = np.zeros(16)
         drawn[kept] = 2 * kept + 1
-        np.testing.assert_array_equal(frame["image"][-1, :, 0], drawn)
+        np.testing.assert_array_equal(frame.arrays["image"][-1, :, 0], drawn)
 
 
 class Wrong(Node):
@@ -179,8 +179,8 @@ def test_a_buffer_holds_how_many_commands_and_instances_are_drawn(
     pipeline = bench.pipeline(text, Counted, shaders=COUNTED).set("a.many", many).set("a.indexed", indexed)
     frame = gl.render(pipeline)
     expected = (np.arange(16) < many).astype(np.float32)
-    np.testing.assert_array_equal(frame["copied"][..., 0].max(axis=0), expected)
-    np.testing.assert_array_equal(frame["drawn"][..., 0].max(axis=0), expected[::-1] if indexed else expected)
+    np.testing.assert_array_equal(frame.arrays["copied"][..., 0].max(axis=0), expected)
+    np.testing.assert_array_equal(frame.arrays["drawn"][..., 0].max(axis=0), expected[::-1] if indexed else expected)
 
 
 def test_a_count_leaves_commands_out(bench: Any, gl: rg.Session) -> None:
@@ -189,7 +189,7 @@ def test_a_count_leaves_commands_out(bench: Any, gl: rg.Session) -> None:
     shaders = {**COUNTED, "count.comp": COUNTED["count.comp"].replace("count = uint(many)", "count = 2u")}
     text = "nodes: {a: {type: counted}}\noutputs: {drawn: a.drawn}"
     frame = gl.render(bench.pipeline(text, Counted, shaders=shaders))
-    assert frame["drawn"].sum() == 2  # of the five commands that are there
+    assert frame.arrays["drawn"].sum() == 2  # of the five commands that are there
 
 
 class Makes(Node):
@@ -216,4 +216,4 @@ def test_commands_of_another_node(bench: Any, gl: rg.Session) -> None:
     shaders = {**COUNTED, "make.comp": make + "void main() { c[0] = 3u; c[1] = 1u; c[2] = 0u; c[3] = 0u; }"}
     text = "nodes:\n  a: {type: makes}\n  b: {type: takes, inputs: {commands: a.commands}}\noutputs: {color: b.color}"
     frame = gl.render(bench.pipeline(text, Makes, Takes, shaders=shaders))
-    np.testing.assert_array_equal(frame["color"][..., 0].max(axis=0), (np.arange(16) < 3).astype(np.float32))
+    np.testing.assert_array_equal(frame.arrays["color"][..., 0].max(axis=0), (np.arange(16) < 3).astype(np.float32))

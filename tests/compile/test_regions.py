@@ -45,12 +45,12 @@ def test_each_frame_has_its_rectangles(bench: Any) -> None:
         expected = np.full((8, 16), 100.0)
         expected[1:3, start : start + 3] += 1
         expected[:2, :4] += 10
-        np.testing.assert_array_equal(frame["image"][::-1, :, 0], expected)
+        np.testing.assert_array_equal(frame.arrays["image"][::-1, :, 0], expected)
 
 
 def test_an_empty_rectangle_draws_nothing_and_a_negative_one_is_refused(bench: Any) -> None:
     pipeline = bench.pipeline(TEXT.replace("NAME", "lamps"), Lamps, shaders=SHADERS)
-    image = bench.session.render(pipeline.set("a.wide", 0))["image"]
+    image = bench.session.render(pipeline.set("a.wide", 0)).arrays["image"]
     assert set(np.unique(image)) == {100, 110}
     with pytest.raises(InputError, match=r"RG433 node 'a' .*: scissor is \(1, 1, -2, 2\), not x, y, width and height"):
         bench.session.render(pipeline.set("a.wide", -2))
@@ -81,7 +81,7 @@ class Cut(Node):
 
 
 def test_clip_distances_hold_for_their_step_alone(draw: Draw) -> None:
-    image = draw(TEXT.replace("NAME", "cut"), Cut, shaders=SHADERS, size=(8, 8))["image"][..., 0]
+    image = draw(TEXT.replace("NAME", "cut"), Cut, shaders=SHADERS, size=(8, 8)).arrays["image"][..., 0]
     expected = np.ones((8, 8))
     expected[:, 4:] += 10
     expected[:4, 4:] += 100
@@ -120,7 +120,7 @@ def test_depth_bounds_that_the_driver_lacks_are_an_error_or_passed_over(bench: A
     with pytest.raises(RendergraphError, match=r"RG435 node 'a' .*: its `State` has depth bounds, which this device"):
         bench.draw(TEXT.replace("NAME", "bounded"), Bounded, shaders=SHADERS)
     text = TEXT.replace("NAME", "bounded_later")
-    assert (bench.draw(text, BoundedLater, shaders=SHADERS)["image"] == 1).all()
+    assert (bench.draw(text, BoundedLater, shaders=SHADERS).arrays["image"] == 1).all()
 
 
 @pytest.mark.parametrize(("cls", "bounds"), [(Bounded, (0.0, 0.2)), (BoundedLater, (0.0, 0.1))])

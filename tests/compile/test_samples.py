@@ -105,10 +105,10 @@ def test_a_half_plane_covers_the_samples_that_lie_in_it(bench: Any, samples: int
     inside = at @ np.array(Shape.edge[:2]) - Shape.edge[2]
     assert np.abs(inside).min() > 1e-4, "no sample lies on the edge, where the rasteriser may decide either way"
     right = (inside > 0).sum(axis=-1)
-    np.testing.assert_array_equal(frame["count"][..., 0], right)
+    np.testing.assert_array_equal(frame.arrays["count"][..., 0], right)
     # A driver may keep more samples than it is asked for (OpenGL 4.5, 8.8), and then takes the mean of all.
     if samples == bench.session.device.limits["samples"]:
-        np.testing.assert_allclose(frame["mean"][..., 0], right / samples, atol=1e-6)
+        np.testing.assert_allclose(frame.arrays["mean"][..., 0], right / samples, atol=1e-6)
     assert len(np.unique(right)) > 2
 
 

@@ -104,7 +104,7 @@ def test_a_geometry_step_counts_with_atomics_and_without_a_target(draw: Draw) ->
     frame = draw("nodes: {a: {type: layers}}\noutputs: {image: a.color}", Layers, shaders=SHADERS, scene=scene)
     x = np.arange(16) + 0.5 - 8.0  # one metre is one pixel
     left = [sum(abs(each - (n - 4)) < (8 - 2 * n) / 2 for n in range(3)) / 2 for each in x]
-    np.testing.assert_array_equal(frame["image"][..., 0], np.broadcast_to(left, (8, 16)))
+    np.testing.assert_array_equal(frame.arrays["image"][..., 0], np.broadcast_to(left, (8, 16)))
 
 
 def test_a_full_screen_step_writes_a_target_a_buffer_and_an_image(draw: Draw) -> None:
@@ -112,10 +112,10 @@ def test_a_full_screen_step_writes_a_target_a_buffer_and_an_image(draw: Draw) ->
     for mode in ({}, {"poison": True, "shuffle": 2}, {"alias": False}):
         frame = draw(text, Histogram, Copy, shaders=SHADERS, taps=["h.bins"], frames=range(1, 3), **mode)
         np.testing.assert_array_equal(frame["h.bins"].view(np.uint32), [4 * 8, 12 * 8])
-        np.testing.assert_array_equal(frame["image"][0, :, 0], [0] * 4 + [10] * 12)
+        np.testing.assert_array_equal(frame.arrays["image"][0, :, 0], [0] * 4 + [10] * 12)
 
 
 def test_attributes_advance_per_instance(draw: Draw) -> None:
-    image = draw("nodes: {a: {type: instances}}\noutputs: {image: a.color}", Instances, shaders=SHADERS)["image"]
+    image = draw("nodes: {a: {type: instances}}\noutputs: {image: a.color}", Instances, shaders=SHADERS).arrays["image"]
     found = {(int(x), int(y)): float(image[::-1][y, x, 0]) for y, x in np.argwhere(image[::-1, :, 0])}
     assert found == {(x + n, n): n + 1.0 for x in (0, 4) for n in range(3)}

@@ -71,7 +71,7 @@ MEAN = {
 def test_mips_are_targets_and_sources_of_one_texture(draw: Draw) -> None:
     text = "nodes: {c: {type: columns}, m: {type: mean, inputs: {source: c.color}}}\noutputs: {image: m.mean}"
     frame = draw(text, Columns, Mean, shaders=MEAN, size=(16, 8))
-    np.testing.assert_allclose(frame["image"], [[[8.5]]])
+    np.testing.assert_allclose(frame.arrays["image"], [[[8.5]]])
 
 
 def test_the_drivers_mip_chain(draw: Draw) -> None:
@@ -88,7 +88,7 @@ def test_the_drivers_mip_chain(draw: Draw) -> None:
             steps.fullscreen("copy.frag", source=self.chain.mip(4), out=self.mean)
 
     text = "nodes: {c: {type: columns}, m: {type: chain, inputs: {source: c.color}}}\noutputs: {image: m.mean}"
-    np.testing.assert_allclose(draw(text, Columns, Chain, shaders=MEAN, size=(16, 8))["image"], [[[8.5]]])
+    np.testing.assert_allclose(draw(text, Columns, Chain, shaders=MEAN, size=(16, 8)).arrays["image"], [[[8.5]]])
 
 
 class Layers(Node):
@@ -106,8 +106,12 @@ NUMBER = {"number.frag": "uniform float number; out float r; void main() { r = n
 
 def test_layers_of_an_array_are_targets(draw: Draw) -> None:
     frame = draw("nodes: {l: {type: layers}}\noutputs: {image: l.array}", Layers, shaders=NUMBER)
-    assert frame["image"].shape == (3, 2, 4, 1)
-    assert [layer.min() for layer in frame["image"]] == [layer.max() for layer in frame["image"]] == [10, 11, 12]
+    assert frame.arrays["image"].shape == (3, 2, 4, 1)
+    assert (
+        [layer.min() for layer in frame.arrays["image"]]
+        == [layer.max() for layer in frame.arrays["image"]]
+        == [10, 11, 12]
+    )
 
 
 def test_faces_of_a_cube_are_targets_and_looked_up_by_direction(draw: Draw) -> None:
@@ -133,7 +137,7 @@ def test_faces_of_a_cube_are_targets_and_looked_up_by_direction(draw: Draw) -> N
         }"""
     text = "nodes: {c: {type: cube}, l: {type: look, inputs: {cube: c.cube}}}\noutputs: {image: l.seen}"
     frame = draw(text, Cube, Look, shaders=NUMBER | {"look.frag": look})
-    np.testing.assert_array_equal(frame["image"][0, :, 0], np.arange(6))
+    np.testing.assert_array_equal(frame.arrays["image"][0, :, 0], np.arange(6))
 
 
 def test_a_geometry_shader_draws_to_all_layers_at_once(draw: Draw) -> None:
@@ -160,7 +164,7 @@ def test_a_geometry_shader_draws_to_all_layers_at_once(draw: Draw) -> None:
             }""",
         "layer.frag": "flat in int v_layer; out float r; void main() { r = float(v_layer); }",
     }
-    image = draw("nodes: {l: {type: layered}}\noutputs: {image: l.array}", Layered, shaders=shaders)["image"]
+    image = draw("nodes: {l: {type: layered}}\noutputs: {image: l.array}", Layered, shaders=shaders).arrays["image"]
     assert [image[layer, -1, 0, 0] for layer in range(4)] == [0, 1, 2, 3]
     assert np.all(image[:, 0, -1, 0] == -1)  # the upper right corner lies outside the triangle
 
@@ -188,7 +192,7 @@ def test_multisampled_textures_are_drawn_and_read_per_sample(draw: Draw) -> None
     }
     shaders["resolve.frag"] = shaders["resolve.frag"].replace("void main() {", "void main() { color = 0.0;")
     text = "nodes: {s: {type: sampled}, r: {type: resolve, inputs: {source: s.color}}}\noutputs: {image: r.color}"
-    image = draw(text, Sampled, Resolve, shaders=shaders, size=(8, 8))["image"][..., 0]
+    image = draw(text, Sampled, Resolve, shaders=shaders, size=(8, 8)).arrays["image"][..., 0]
     assert image[-1, 0] == 1.0
     assert image[0, -1] == 0.0
     assert abs(image.mean() - 0.5) < 0.02  # half the picture, which one sample a pixel misses by 1/16
@@ -219,7 +223,9 @@ def test_stencil_marks_where_the_next_step_draws(draw: Draw) -> None:
                 )
 
     shaders = NUMBER | {"triangle.vert": TRIANGLE}
-    image = draw("nodes: {m: {type: marked}}\noutputs: {image: m.color}", Marked, shaders=shaders, size=(8, 8))["image"]
+    image = draw("nodes: {m: {type: marked}}\noutputs: {image: m.color}", Marked, shaders=shaders, size=(8, 8)).arrays[
+        "image"
+    ]
     assert image[-1, 0, 0] == 1.0
     assert image[0, -1, 0] == 2.0
     assert set(np.unique(image)) == {1.0, 2.0}
@@ -240,7 +246,7 @@ def test_stencil_is_cleared_whatever_mask_the_frame_before_has_left(draw: Draw) 
 
     shaders = NUMBER | {"triangle.vert": TRIANGLE}
     text = "nodes: {m: {type: guarded}}\noutputs: {image: m.color}"
-    image = draw(text, Guarded, shaders=shaders, size=(8, 8), frames=range(1, 4))["image"]
+    image = draw(text, Guarded, shaders=shaders, size=(8, 8), frames=range(1, 4)).arrays["image"]
     assert image[-1, 0, 0] == 1.0
     assert image[0, -1, 0] == 0.0
 
@@ -270,9 +276,9 @@ def test_depth_of_another_node_is_tested_and_not_written(draw: Draw) -> None:
         "nodes: {n: {type: near}, b: {type: behind, inputs: {depth: n.depth}}}\noutputs: {image: b.color, d: n.depth}"
     )
     frame = draw(text, Near, Behind, shaders=shaders, size=(8, 8))
-    assert frame["image"][-1, 0, 0] == 0.0
-    assert frame["image"][0, -1, 0] == 1.0
-    assert set(np.unique(frame["d"])) == {0.0, 0.5}
+    assert frame.arrays["image"][-1, 0, 0] == 0.0
+    assert frame.arrays["image"][0, -1, 0] == 1.0
+    assert set(np.unique(frame.arrays["d"])) == {0.0, 0.5}
 
 
 def test_scissor_mask_and_blend(draw: Draw) -> None:
@@ -323,7 +329,9 @@ def test_a_mip_that_is_drawn_to_first_is_cleared_like_the_port_says(draw: Draw) 
         "none.frag": "out float r; void main() { discard; }",
         "first.frag": "uniform sampler2D source; out float r; void main() { r = texelFetch(source, ivec2(0), 0).r; }",
     }
-    image = draw("nodes: {a: {type: levels}}\noutputs: {image: a.shown}", Levels, shaders=shaders, poison=True)["image"]
+    image = draw("nodes: {a: {type: levels}}\noutputs: {image: a.shown}", Levels, shaders=shaders, poison=True).arrays[
+        "image"
+    ]
     assert np.all(image == 3)
 
 
@@ -375,7 +383,7 @@ class Filled(Node):
 def test_a_clear_fills_missing_channels_with_zero_and_stays_in_range(draw: Draw) -> None:
     frame = draw("nodes: {f: {type: filled}}\noutputs: {image: f.color, ids: f.ids}", Filled)
     np.testing.assert_array_equal(frame["image"][0, 0], [1, 2, 3, 0])
-    assert frame["ids"].max() == 0
+    assert frame.arrays["ids"].max() == 0
 
 
 class Slope(Node):
@@ -394,6 +402,6 @@ def test_a_fullscreen_step_writes_the_depth_it_computes(draw: Draw) -> None:
     shaders = {"slope.frag": "void main() { gl_FragDepth = 1.0 - gl_FragCoord.x / 16.0; }"}
     expected = np.broadcast_to(1 - (np.arange(16, dtype=np.float32) + 0.5) / 16, (8, 16))
     text = "nodes: {s: {type: slope, params: {tested: %s}}}\noutputs: {depth: s.slope}\n"
-    np.testing.assert_array_equal(draw(text % "false", Slope, shaders=shaders)["depth"][..., 0], expected)
+    np.testing.assert_array_equal(draw(text % "false", Slope, shaders=shaders).arrays["depth"][..., 0], expected)
     kept = np.maximum(expected, 0.25)
-    np.testing.assert_array_equal(draw(text % "true", Slope, shaders=shaders)["depth"][..., 0], kept)
+    np.testing.assert_array_equal(draw(text % "true", Slope, shaders=shaders).arrays["depth"][..., 0], kept)

@@ -159,7 +159,7 @@ def test_a_layer_and_a_mip_are_given_values(draw: Draw) -> None:
         "void main() { color = float(texelFetch(source, ivec3(2, 1, 1), 0).r + texelFetch(source, ivec3(0, 0, 1), 1).r); }"
     }
     text = "nodes: {a: {type: volume}, b: {type: reads, inputs: {source: a.color}}}\noutputs: {image: b.color}"
-    assert draw(text, Volume, Reads, shaders=shaders)["image"].max() == 6 + 7
+    assert draw(text, Volume, Reads, shaders=shaders).arrays["image"].max() == 6 + 7
 
 
 class Cleared(Node):

@@ -49,7 +49,7 @@ SHADERS = {
 def test_previous_starts_with_the_first_value_and_goes_on(bench: Any) -> None:
     text = "nodes: {a: {type: increment, inputs: {before: a.after@previous}}}\noutputs: {image: a.after}"
     frames = bench.frames(text, Increment, shaders=SHADERS, frames=range(1, 6))
-    assert [float(frame["image"].mean()) for frame in frames] == [101, 102, 103, 104, 105]
+    assert [float(frame.arrays["image"].mean()) for frame in frames] == [101, 102, 103, 104, 105]
 
 
 def test_two_nodes_that_read_each_others_last_frame(draw: Draw) -> None:
@@ -57,7 +57,7 @@ def test_two_nodes_that_read_each_others_last_frame(draw: Draw) -> None:
   a: {type: increment, inputs: {before: b.after@previous}}
   b: {type: increment, inputs: {before: a.after}}
 outputs: {image: b.after}"""
-    assert np.all(draw(text, Increment, shaders=SHADERS, frames=range(1, 5))["image"] == 108)
+    assert np.all(draw(text, Increment, shaders=SHADERS, frames=range(1, 5)).arrays["image"] == 108)
 
 
 def test_history_that_is_read_before_it_is_written_has_one_texture(bench: Any) -> None:
@@ -69,7 +69,7 @@ outputs: {image: b.after}"""
     assert len(pipeline.plan().placement["b.after"]) == 1
     for options in ({}, {"alias": False}, {"poison": True}):
         frames = list(bench.session.frames(pipeline, frames=range(1, 5), **options))
-        assert [frame["image"].mean() for frame in frames] == [102, 104, 106, 108]
+        assert [frame.arrays["image"].mean() for frame in frames] == [102, 104, 106, 108]
 
 
 def test_history_of_the_nodes_own(draw: Draw) -> None:
@@ -140,7 +140,7 @@ def test_the_last_frame_of_a_texture_that_nodes_further_down_continue(draw: Draw
   half: {type: halve, inputs: {old: plus.color@previous}}
   plus: {type: plus, inputs: {color: half.color}}
 outputs: {image: plus.color}"""
-    assert np.all(draw(text, Halve, Plus, shaders=CONTINUED, frames=range(1, 4))["image"] == 1.75)
+    assert np.all(draw(text, Halve, Plus, shaders=CONTINUED, frames=range(1, 4)).arrays["image"] == 1.75)
 
 
 class PlusFrom(Plus):
@@ -154,7 +154,7 @@ def test_the_first_frame_of_a_continued_texture_is_what_its_reader_s_source_says
   half: {type: halve, inputs: {old: plus.color@previous}}
   plus: {type: plus_from, inputs: {color: half.color}}
 outputs: {image: plus.color}"""
-    assert np.all(draw(text, Halve, PlusFrom, shaders=CONTINUED)["image"] == 3)
+    assert np.all(draw(text, Halve, PlusFrom, shaders=CONTINUED).arrays["image"] == 3)
 
 
 class Blends(Node):
@@ -177,7 +177,8 @@ outputs: {image: blend.color}"""
         bench.pipeline(text, Ones, Blends, shaders=CONTINUED).check()
     mended = text.replace("one.color@previous", "blend.color@previous")
     frames = [
-        bench.draw(mended, Ones, Blends, shaders=CONTINUED, frames=range(1, count + 1))["image"] for count in (1, 2, 3)
+        bench.draw(mended, Ones, Blends, shaders=CONTINUED, frames=range(1, count + 1)).arrays["image"]
+        for count in (1, 2, 3)
     ]
     assert [float(frame.max()) for frame in frames] == [1.0, 1.5, 1.75]
 
@@ -207,8 +208,8 @@ def test_a_node_that_records_nothing_passes_on_what_it_continues(draw: Draw) -> 
   last: {type: plus, inputs: {color: silent.color}}
 outputs: {image: last.color, between: silent.color}"""
     frame = draw(text, Ones, Silent, Plus, shaders=CONTINUED)
-    assert np.all(frame["image"] == 2)
-    assert np.all(frame["between"] == 1)
+    assert np.all(frame.arrays["image"] == 2)
+    assert np.all(frame.arrays["between"] == 1)
     assert frame.culled["silent"] == "it recorded no step"
 
 
@@ -237,8 +238,8 @@ def test_a_node_with_nothing_to_read_passes_on_what_it_would_continue(draw: Draw
 outputs: {image: last.color, between: idle.color}"""
     plain = text.replace("{type: plus}", "{type: halve, inputs: {old: last.color@previous}}")
     frame = draw(plain, Nothing, Halve, Plus, Needy, shaders=CONTINUED, frames=range(1, 3))
-    assert np.all(frame["image"] == 1.5)
-    assert np.all(frame["between"] == 0.5)
+    assert np.all(frame.arrays["image"] == 1.5)
+    assert np.all(frame.arrays["between"] == 0.5)
     assert frame.culled["idle"] == "none.layers has no layers: there is nothing to read"
 
 
@@ -248,7 +249,7 @@ def test_last_frame_s_value_of_a_node_that_does_nothing_is_its_first(draw: Draw)
   idle: {type: needy, inputs: {layers: none.layers}}
   half: {type: halve, inputs: {old: idle.color@previous}}
 outputs: {image: half.color}"""
-    assert np.all(draw(text, Nothing, Halve, Needy, shaders=CONTINUED, frames=range(1, 3))["image"] == 4)
+    assert np.all(draw(text, Nothing, Halve, Needy, shaders=CONTINUED, frames=range(1, 3)).arrays["image"] == 4)
 
 
 class Walkers(Node):
@@ -305,9 +306,9 @@ def test_a_buffer_keeps_last_frames_values(bench: Any) -> None:
         frames=range(1, 5),
     )
     for number, frame in enumerate(frames, 1):
-        rows, columns = np.nonzero(frame["image"][::-1, :, 0])
+        rows, columns = np.nonzero(frame.arrays["image"][::-1, :, 0])
         assert set(zip(columns.tolist(), rows.tolist(), strict=True)) == {(number, 0), (number, number)}
-        assert frame["image"].max() == number
+        assert frame.arrays["image"].max() == number
 
 
 def test_a_buffer_is_handed_back_from_the_last_frame(bench: Any) -> None:
@@ -322,9 +323,9 @@ def test_a_buffer_is_handed_back_from_the_last_frame(bench: Any) -> None:
     text = "nodes: {a: {type: tally, inputs: {before: a.count@previous}}}\noutputs: {image: a.color}"
     for reuse in (False, True):
         frames = bench.frames(text, Tally, shaders=shaders, frames=range(1, 4), reuse=reuse)
-        assert [float(frame["image"].mean()) for frame in frames] == [1, 2, 3]
+        assert [float(frame.arrays["image"].mean()) for frame in frames] == [1, 2, 3]
     for mode in ({"alias": False}, {"poison": True, "shuffle": 3}):
-        assert bench.draw(text, Tally, shaders=shaders, frames=range(1, 4), **mode)["image"].mean() == 3
+        assert bench.draw(text, Tally, shaders=shaders, frames=range(1, 4), **mode).arrays["image"].mean() == 3
 
 
 class Seen(Node):

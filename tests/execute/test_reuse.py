@@ -125,7 +125,7 @@ class Clock(Node):
 )
 def test_a_shader_sees_the_time_however_it_names_it(bench: Any, text: str) -> None:
     pipeline = bench.pipeline("nodes: {a: {type: clock}}\noutputs: {x: a.color}", Clock, shaders={"clock.frag": text})
-    seen = [float(frame["x"][0, 0, 0]) for frame in bench.session.frames(pipeline, frames=range(1, 4), fps=2)]
+    seen = [float(frame.arrays["x"][0, 0, 0]) for frame in bench.session.frames(pipeline, frames=range(1, 4), fps=2)]
     assert seen == [0.0, 0.5, 1.0]
 
 

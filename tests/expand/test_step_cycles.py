@@ -401,4 +401,4 @@ def test_bundles_of_steps_compute_what_the_steps_do(bench: Any, gl: rg.Session, 
     frame = gl.render(bench.pipeline(text, Bundle, shaders={"add.frag": ADD_FRAG}, size=(1, 1)))
     for step, value in enumerate(values):
         if ends[step]:
-            assert frame[f"o{step}"].item() == pytest.approx(value, rel=1e-6)
+            assert frame.arrays[f"o{step}"].item() == pytest.approx(value, rel=1e-6)

@@ -76,7 +76,7 @@ def draw(name: str, driver: str, session: rg.Session) -> dict[str, npt.NDArray[A
     pipeline = load(name, driver)
     ports = tuple(semantics(pipeline))
     frame = list(session.frames(pipeline, outputs=(), taps=ports, frames=range(1, 3)))[-1]
-    return {port: frame[port] for port in ports}
+    return {port: frame.arrays[port] for port in ports}
 
 
 def cases() -> Iterator[object]:

@@ -89,7 +89,7 @@ def test_every_variant_compiles_and_the_default_passes_check_node(name: str) -> 
     assert examine(CATALOG.get(name), renders=lambda variant: not variant.name).mistakes == ()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", sorted(LONG))
 def test_variants_with_long_programs_compile(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rendergraph.authoring.examine.variants", lambda cls: variants(cls)[::4])
@@ -153,6 +153,7 @@ def test_no_shader_is_an_orphan() -> None:
         "light_mean.frag",
         "texture.comp",
         "texture_sample.glsl",
+        "shadertoy.glsl",
     )
     spare = {SHADERS / "include" / name for name in others}
     spare |= {Path(kind.shader) for kind in TEXTURES.values()}

@@ -201,7 +201,7 @@ cameras: {main: {eye: [0, 0, 2], target: [0, 0, 0], fov_y_degrees: 90, near: 0.1
     y, x = (np.mgrid[0:16, 0:16] + 0.5) / 8 - 1
     expected = np.stack([x * 4, -y * 4, np.full_like(x, -2.0), np.ones_like(x)], axis=-1)  # front face, 4 m away
     np.testing.assert_allclose(frame["image"], expected, atol=2e-4)
-    assert frame["d"].shape == (16, 16, 1)
+    assert frame.arrays["d"].shape == (16, 16, 1)
 
 
 class Ramp(Node):

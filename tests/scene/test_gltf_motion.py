@@ -531,7 +531,7 @@ outputs: {velocity: gbuffer.velocity, depth: gbuffer.depth}
     triangles = reference.array(1 + 3)[:, 0].astype(int).reshape(-1, 3)
     view = view_matrices(scene.cameras["main"], SIZE)
     width, height = SIZE
-    depth = frame["depth"][..., 0].astype(float)
+    depth = frame.arrays["depth"][..., 0].astype(float)
     y, x = np.nonzero(depth)
     place = np.stack([(x + 0.5) / width, (height - y - 0.5) / height], axis=1) * 2 - 1
     ndc = np.column_stack([place, 1 - 2 * depth[y, x], np.ones(len(x))])

@@ -17,7 +17,7 @@ def load(project: Path) -> rg.Pipeline:
 
 
 def value(gl: rg.Session, pipeline: rg.Pipeline, name: str = "image") -> float:
-    return float(gl.render(pipeline)[name].mean())
+    return float(gl.render(pipeline).arrays[name].mean())
 
 
 def made(gl: rg.Session) -> tuple[int, int]:
@@ -98,7 +98,7 @@ def test_a_changed_mesh_is_read_again_and_an_unchanged_one_is_not(gl: rg.Session
 
     def covered() -> int:
         depth = gl.render(rg.load("deferred", scene=tmp_path / "s.yaml", size=(32, 32)), taps=["gbuffer.depth"])
-        return int((depth["gbuffer.depth"] > 0).sum())
+        return int((depth.arrays["gbuffer.depth"] > 0).sum())
 
     first, scenes = covered(), gl.cache.scenes_made
     assert covered() == first

@@ -38,25 +38,25 @@ def test_programs_stay_within_their_number_and_the_last_ones_are_not_compiled_ag
     with rg.Session(cache=rg.CacheLimits(programs=8)) as session:
         pictures = {}
         for count, variant in enumerate(variants(project, *range(1, 21)), start=1):
-            pictures[count] = session.render(variant)["image"]
+            pictures[count] = session.render(variant).arrays["image"]
             assert session.cache.programs.alive <= 8
         assert session.cache.programs.compiled == 21
         lately = range(14, 21)
         for _ in range(3):
             for count, variant in zip(lately, variants(project, *lately), strict=True):
-                np.testing.assert_array_equal(session.render(variant)["image"], pictures[count])
+                np.testing.assert_array_equal(session.render(variant).arrays["image"], pictures[count])
         assert session.cache.programs.compiled == 21
-        np.testing.assert_array_equal(session.render(variants(project, 1)[0])["image"], pictures[1])
+        np.testing.assert_array_equal(session.render(variants(project, 1)[0]).arrays["image"], pictures[1])
         assert session.cache.programs.compiled == 22
 
 
 def test_variants_share_their_textures(project: Path) -> None:
     with rg.Session() as session:
         first, second = variants(project, 1, 2)
-        before = session.render(first)["image"]
+        before = session.render(first).arrays["image"]
         made = session.device.textures_made
-        assert not np.array_equal(session.render(second)["image"], before)
-        np.testing.assert_array_equal(session.render(first)["image"], before)
+        assert not np.array_equal(session.render(second).arrays["image"], before)
+        np.testing.assert_array_equal(session.render(first).arrays["image"], before)
         assert session.device.textures_made == made
         assert len(session.cache.executables) == 2
 

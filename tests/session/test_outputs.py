@@ -74,15 +74,16 @@ def _one(array: npt.NDArray[np.float32]) -> float:
 def test_a_layer_a_mip_and_both_are_read_alone(tap: Callable[..., rg.Frame]) -> None:
     parts = ("cube.radiance[2,mip=3]", "cube.radiance[4]", "cube.radiance[mip=1]", "cube.radiance")
     frame = tap(*parts)
-    assert [frame[name].shape for name in parts] == [(1, 1, 1), (8, 8, 1), (6, 4, 4, 1), (6, 8, 8, 1)]
-    assert (_one(frame[parts[0]]), _one(frame[parts[1]])) == (23.0, 40.0)
-    np.testing.assert_array_equal(frame[parts[2]][:, 0, 0, 0], [1, 11, 21, 31, 41, 51])
+    assert [frame.arrays[name].shape for name in parts] == [(1, 1, 1), (8, 8, 1), (6, 4, 4, 1), (6, 8, 8, 1)]
+    assert [frame[name].shape for name in parts] == [(1, 1), (8, 8), (6, 4, 4), (6, 8, 8)]
+    assert (_one(frame.arrays[parts[0]]), _one(frame.arrays[parts[1]])) == (23.0, 40.0)
+    np.testing.assert_array_equal(frame.arrays[parts[2]][:, 0, 0, 0], [1, 11, 21, 31, 41, 51])
     assert [frame.info(name).kind for name in parts] == ["texture2d", "texture2d", "texture_cube", "texture_cube"]
 
 
 def test_the_stencil_is_read_beside_the_depth(tap: Callable[..., rg.Frame]) -> None:
     frame = tap("marks.alone:stencil", "marks.alone")
-    stencil, depth = frame["marks.alone:stencil"], frame["marks.alone"]
+    stencil, depth = frame.arrays["marks.alone:stencil"], frame.arrays["marks.alone"]
     assert stencil.dtype == np.uint32
     assert (stencil[-1, 0, 0], stencil[0, -1, 0]) == (165, 0)
     np.testing.assert_array_equal(stencil == 165, depth > 0)
@@ -92,15 +93,15 @@ def test_the_stencil_is_read_beside_the_depth(tap: Callable[..., rg.Frame]) -> N
 
 def test_samples_are_resolved(tap: Callable[..., rg.Frame]) -> None:
     frame = tap("marks.color", "marks.count", "marks.depth", "marks.depth:stencil")
-    color = frame["marks.color"]
+    color = frame.arrays["marks.color"]
     assert (color[-1, 0, 0], color[0, -1, 0]) == (1.0, 0.0)
     assert set(np.unique(color)) <= {0.0, 0.25, 0.5, 0.75, 1.0}
     assert set(np.unique(color)) - {0.0, 1.0}, "colours are the mean of the samples"
-    inside = frame["marks.count"] == 7
-    assert set(np.unique(frame["marks.count"])) == {0, 7}, "whole numbers are those of one sample"
-    np.testing.assert_array_equal(np.unique(frame["marks.depth"]), [0.0, 0.5])
-    np.testing.assert_array_equal(frame["marks.depth"] == 0.5, inside)
-    np.testing.assert_array_equal(frame["marks.depth:stencil"] == 165, inside)
+    inside = frame.arrays["marks.count"] == 7
+    assert set(np.unique(frame.arrays["marks.count"])) == {0, 7}, "whole numbers are those of one sample"
+    np.testing.assert_array_equal(np.unique(frame.arrays["marks.depth"]), [0.0, 0.5])
+    np.testing.assert_array_equal(frame.arrays["marks.depth"] == 0.5, inside)
+    np.testing.assert_array_equal(frame.arrays["marks.depth:stencil"] == 165, inside)
 
 
 @pytest.mark.parametrize(
@@ -130,7 +131,7 @@ def test_resolving_between_two_frames_changes_neither(draw: Callable[..., rg.Fra
     first = draw(TEXT, Cube, Marks, shaders=shaders, size=(8, 8), taps=names)
     later = draw(TEXT, Cube, Marks, shaders=shaders, size=(8, 8), taps=names, frames=range(1, 4))
     for name in ("image", *names):
-        np.testing.assert_array_equal(first[name], later[name])
+        np.testing.assert_array_equal(first.arrays[name], later.arrays[name])
 
 
 class Figures(Node):

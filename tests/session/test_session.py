@@ -281,7 +281,7 @@ def test_two_plugins_with_equal_names_keep_their_shaders(gl: rg.Session, tmp_pat
         (folder / "flat.frag").write_text(f"out float color; void main() {{ color = {value}; }}")
         (folder / "flat.yaml").write_text("rendergraph: 1\nnodes: {a: {type: flat}}\noutputs: {image: a.color}")
         frame = gl.render(rg.load(folder / "flat.yaml", size=(4, 4), plugins=[folder / "flat.py"]))
-        values.append(float(frame["image"].mean()))
+        values.append(float(frame.arrays["image"].mean()))
     assert values == [0.25, 0.75]
 
 

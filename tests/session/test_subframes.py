@@ -137,7 +137,7 @@ def test_the_picture_is_jittered_once_a_frame(gl: rg.Session, scene: Path) -> No
     scene.write_text(SCENE.replace("  ball:", post + "  ball:"))
     pipeline = rg.load("taa", scene=scene, size=SIZE)
     one, many = (
-        [frame["gbuffer.depth"][:, 44:] for frame in gl.frames(pipeline, **options, taps=["gbuffer.depth"])]
+        [frame.arrays["gbuffer.depth"][:, 44:] for frame in gl.frames(pipeline, **options, taps=["gbuffer.depth"])]
         for options in ({"frames": range(1, 4)}, {"frames": range(1, 4), "subframes": 3})
     )
     assert (one[2] != one[1]).any()

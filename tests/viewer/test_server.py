@@ -322,6 +322,7 @@ def test_a_flood_ends_its_socket(limited: Any) -> None:
     alive(limited)
 
 
+@pytest.mark.nightly
 def test_a_page_that_reads_nothing_holds_up_nobody(served: Any) -> None:
     with served.tab() as deaf, served.tab() as tab:
         for number in range(2, 30):

@@ -12,17 +12,22 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from OpenImageIO import ImageBuf, ImageSpec
+from OpenImageIO import ImageBuf
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from images.layout import Layout, laid_out  # how the documentation's pictures are put together
 
 import rendergraph as rg
+from rendergraph import images
 
 HERE = Path(__file__).parent
-GAP = 4
+GAP = 8
 POSTS = (
     ("ssao-disc", ["form=disc", "samples=64", "radius=1.2"]),
     ("ssao-disc", ["samples=8", "radius=3"]),
     ("ssil", ["samples=64", "radius=1.2"]),
 )
+POST_NAMES = ("discs", "few strips", "a bitmask")
 STAIRS = ("ssao-hemisphere", "ssao-disc", "ssao-hbao", "ssao-gtao", "ssao-ssgi", "ssil")
 
 
@@ -46,17 +51,11 @@ def traced(session: rg.Session) -> npt.NDArray[np.float32]:
     return np.asarray(np.where(whole > 0, truth[..., :3].sum(-1) / np.maximum(whole, 1e-6), 1), np.float32)
 
 
-def write(file: Path, rows: list[list[npt.NDArray[Any]]]) -> None:
-    """Panels of equal size as a sheet, values 0 to 1, a gap between them."""
-    lines = []
-    for row in rows:
-        gap = np.ones((row[0].shape[0], GAP, 3))
-        lines.append(np.concatenate([part for panel in row for part in (panel, gap)][:-1], 1))
-    sheet = [part for line in lines for part in (line, np.ones((GAP, *line.shape[1:])))][:-1]
-    picture = np.ascontiguousarray(np.concatenate(sheet), np.float32)
-    buffer = ImageBuf(ImageSpec(picture.shape[1], picture.shape[0], 3, "float"))
-    buffer.set_pixels(buffer.roi, picture)
-    buffer.write(str(file), "uint8")
+def write(file: Path, panels: dict[str, npt.NDArray[Any]], columns: int, enlarge: int) -> None:
+    """Panels of equal size as a sheet with their names, values 0 to 1; pixels are repeated."""
+    large = [np.repeat(np.repeat(panel, enlarge, 0), enlarge, 1) for panel in panels.values()]
+    bytes_ = [(np.clip(panel, 0, 1) * 255 + 0.5).astype(np.uint8) for panel in large]
+    images.write(file, laid_out(bytes_, Layout(columns, GAP, list(panels))))
 
 
 def main() -> None:
@@ -64,15 +63,16 @@ def main() -> None:
     folder = Path(sys.argv[1])
     with rg.Session() as session:
         grey = [occlusion(session, name, "posts.yaml", (270, 200), sets) for name, sets in POSTS]
-        write(folder / "ssao-disc-fails.png", [[np.repeat(one[..., None], 3, -1) for one in grey]])
+        shown = {name: np.repeat(one[..., None], 3, -1) for name, one in zip(POST_NAMES, grey, strict=True)}
+        write(folder / "ssao-disc-fails.png", shown, 3, 2)
         truth = traced(session)
         size = (truth.shape[1], truth.shape[0])
-        panels = []
+        panels = {}
         for name in STAIRS:
             off = 8 * (occlusion(session, name, "stairs.yaml", size, ["samples=64", "radius=1"]) - truth)
             dark, light = np.maximum(-off, 0), np.maximum(off, 0)
-            panels.append(1 - np.clip(np.stack([light, dark + light, dark], -1), 0, 1))
-        write(folder / "ssao-errors.png", [panels[:3], panels[3:]])
+            panels[name] = 1 - np.stack([light, dark + light, dark], -1)
+        write(folder / "ssao-errors.png", panels, 3, 2)
 
 
 if __name__ == "__main__":

@@ -75,5 +75,5 @@ def render_frames(
         pattern = folder / f"{run.output}.####{run.picture.suffix}"
         for frame in stages.draw(stages.expand(linked, render_options), gpu):
             path = numbered(pattern, frame.number)
-            save_outputs([Saved(path, frame[run.output], frame.info(run.output), raw=False)], frame.metadata)
+            save_outputs([Saved(path, frame.arrays[run.output], frame.info(run.output), raw=False)], frame.metadata)
             yield path

@@ -35,7 +35,7 @@ def test_the_threshold_is_measured_after_exposure(draw: Draw, noise: Callable[..
     picture = noise(33, 20)
     frame = draw(picture, EXPOSED)
     np.testing.assert_allclose(
-        frame["image"][..., :3], bright(picture, 1.5 / frame["gain"][0, 0, 0]), rtol=1e-5, atol=1e-6
+        frame["image"][..., :3], bright(picture, 1.5 / frame.arrays["gain"][0, 0, 0]), rtol=1e-5, atol=1e-6
     )
     assert 0.1 < (frame["image"][..., 1] > 0).mean() < 0.9
 

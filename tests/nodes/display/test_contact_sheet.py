@@ -46,7 +46,7 @@ def test_pictures_stand_in_a_grid_and_shrink_to_the_mean_of_their_light(session:
     pipeline = sheet(["display.color"] * 2 + ["light.surface_depth"], (64, 36), background=0.5)
     frame = session.render(pipeline)
     whole = frame["image"][..., :3] / 255
-    picture, depth = frame["picture"][..., :3] / 255, frame["depth"].astype(np.float64)
+    picture, depth = frame["picture"][..., :3] / 255, frame.arrays["depth"].astype(np.float64)
     # (64 - 3 × 4) / 2 = 26 across, (36 - 3 × 4) / 2 = 12 down: 21 × 12 are shown, in the middle of the sheet.
     rows, columns = (4, 20), (9, 34)
     small = encoded(shrunk(decoded(picture), 12, 21))
@@ -66,8 +66,8 @@ def test_one_picture_alone_is_itself_and_what_is_small_shows_its_texels(session:
     outputs = {"image": "sheet.color", "texel": "exposure.luminance", "radiance": None}
     patch = {"nodes": nodes, "outputs": outputs}
     frame = session.render(rg.load("hdr", size=(40, 30), sets=["sun.resolution=64"], patches=[patch]))
-    assert 0.05 < frame["texel"][0, 0, 0] < 1
-    np.testing.assert_allclose(frame["image"][:, 5:35, :3] / 255, frame["texel"][0, 0, 0], atol=0.6 / 255)
+    assert 0.05 < frame.arrays["texel"][0, 0, 0] < 1
+    np.testing.assert_allclose(frame["image"][:, 5:35, :3] / 255, frame.arrays["texel"][0, 0, 0], atol=0.6 / 255)
     assert (frame["image"][:, :5, :3] == frame["image"][0, 0, :3]).all()
 
 

@@ -42,8 +42,8 @@ def test_reference_picture(draw: Draw, reference: dict[str, Floats], shared: Pat
     values = json.loads((shared / "reference/b7_post/values.json").read_text())["images"]["image_96x64"]
     frame = draw(reference["picture"], nodes(delta=delta))
     expected = values[f"log_average_delta_{delta}"]
-    np.testing.assert_allclose(frame["luminance"], [[[expected]]], rtol=RELATIVE)
-    np.testing.assert_allclose(frame["gain"], [[[values["key"] / expected]]], rtol=RELATIVE)
+    np.testing.assert_allclose(frame.arrays["luminance"], [[[expected]]], rtol=RELATIVE)
+    np.testing.assert_allclose(frame.arrays["gain"], [[[values["key"] / expected]]], rtol=RELATIVE)
 
 
 @pytest.mark.parametrize(
@@ -54,8 +54,8 @@ def test_reference_picture(draw: Draw, reference: dict[str, Floats], shared: Pat
 def test_every_pixel_counts_the_same_at_any_size(draw: Draw, noise: Noise, size: tuple[int, int]) -> None:
     picture = noise(*size)
     frame = draw(picture, nodes(key=0.5))
-    np.testing.assert_allclose(frame["luminance"], [[[log_average(picture)]]], rtol=RELATIVE)
-    np.testing.assert_allclose(frame["gain"], [[[0.5 / log_average(picture)]]], rtol=RELATIVE)
+    np.testing.assert_allclose(frame.arrays["luminance"], [[[log_average(picture)]]], rtol=RELATIVE)
+    np.testing.assert_allclose(frame.arrays["gain"], [[[0.5 / log_average(picture)]]], rtol=RELATIVE)
 
 
 def test_one_bright_pixel_weighs_the_same_wherever_it_is(draw: Draw) -> None:
@@ -65,7 +65,7 @@ def test_one_bright_pixel_weighs_the_same_wherever_it_is(draw: Draw) -> None:
         picture = black.copy()
         picture[y, x] = 100.0
         expected = log_average(picture)
-        np.testing.assert_allclose(draw(picture, nodes())["luminance"], [[[expected]]], rtol=RELATIVE)
+        np.testing.assert_allclose(draw(picture, nodes()).arrays["luminance"], [[[expected]]], rtol=RELATIVE)
 
 
 def metered(picture: Floats, low: float, high: float, center: float) -> float:
@@ -90,8 +90,8 @@ def test_histogram(draw: Draw, low: float, high: float, center: float) -> None:
     params: dict[str, Any] = {"low_percentile": low, "high_percentile": high, "center_weight": center}
     frame = draw(picture, nodes(method="histogram", **params))
     expected = metered(picture, low, high, center)
-    np.testing.assert_allclose(frame["luminance"], [[[expected]]], rtol=1e-4)
-    np.testing.assert_allclose(frame["gain"], [[[0.18 / expected]]], rtol=1e-4)
+    np.testing.assert_allclose(frame.arrays["luminance"], [[[expected]]], rtol=1e-4)
+    np.testing.assert_allclose(frame.arrays["gain"], [[[0.18 / expected]]], rtol=1e-4)
 
 
 def test_black_surroundings_and_a_lamp_do_not_decide(draw: Draw) -> None:
@@ -99,16 +99,18 @@ def test_black_surroundings_and_a_lamp_do_not_decide(draw: Draw) -> None:
     picture = np.full((20, 20, 3), 0.3, np.float32)
     picture[:, :8] = 0
     picture[0, 8:12] = 1e4
-    gain = draw(picture, nodes(method="histogram", center_weight=0, low_percentile=50, high_percentile=95))[
-        "gain"
-    ].item()
+    gain = (
+        draw(picture, nodes(method="histogram", center_weight=0, low_percentile=50, high_percentile=95))
+        .arrays["gain"]
+        .item()
+    )
     assert gain * 0.3 == pytest.approx(0.18, rel=2 ** (1 / 16) - 1)
 
 
 def test_limit_and_compensation(draw: Draw, noise: Noise) -> None:
     for factor, expected in ((1e-6, 2**1.5), (1e6, 2**-1.5)):
         frame = draw(noise(9, 9) * np.float32(factor), nodes(limit=1.5, compensation=1, delta=1e-9))
-        np.testing.assert_allclose(frame["gain"], [[[2 * expected]]], rtol=1e-6)
+        np.testing.assert_allclose(frame.arrays["gain"], [[[2 * expected]]], rtol=1e-6)
 
 
 def test_a_brighter_scene_has_that_much_more_and_looks_the_same(draw: Draw, reference: dict[str, Floats]) -> None:
@@ -117,9 +119,9 @@ def test_a_brighter_scene_has_that_much_more_and_looks_the_same(draw: Draw, refe
     lit = luminance(picture) > 1e-6
     for factor in (1 / 16, 64):  # powers of two: the pictures themselves are exact
         more = draw(picture * np.float32(factor), nodes(delta=1e-7 * factor))
-        np.testing.assert_allclose(more["luminance"], once["luminance"] * factor, rtol=RELATIVE)
-        exposed = picture[lit] * once["gain"][0, 0]
-        np.testing.assert_allclose(picture[lit] * factor * more["gain"][0, 0], exposed, rtol=2 * RELATIVE)
+        np.testing.assert_allclose(more.arrays["luminance"], once.arrays["luminance"] * factor, rtol=RELATIVE)
+        exposed = picture[lit] * once.arrays["gain"][0, 0]
+        np.testing.assert_allclose(picture[lit] * factor * more.arrays["gain"][0, 0], exposed, rtol=2 * RELATIVE)
 
 
 def test_only_what_is_covered_counts(draw: Draw, noise: Noise) -> None:
@@ -128,16 +130,16 @@ def test_only_what_is_covered_counts(draw: Draw, noise: Noise) -> None:
     picture[..., 3] = np.where(rng.random((10, 24)) < 0.3, rng.random((10, 24)), 0)
     logs, weights = np.log(1e-4 + luminance(picture)), picture[..., 3].astype(np.float64)
     covered = np.exp((logs * weights).sum() / weights.sum())
-    np.testing.assert_allclose(draw(picture, nodes())["luminance"], [[[covered]]], rtol=RELATIVE)
-    everything = draw(picture, nodes(meter="all"))["luminance"]
+    np.testing.assert_allclose(draw(picture, nodes()).arrays["luminance"], [[[covered]]], rtol=RELATIVE)
+    everything = draw(picture, nodes(meter="all")).arrays["luminance"]
     np.testing.assert_allclose(everything, [[[log_average(picture)]]], rtol=RELATIVE)
 
 
 def test_nothing_to_see_leaves_the_exposure_alone(draw: Draw) -> None:
     frame = draw(np.zeros((4, 6, 4), np.float32), nodes())
-    assert frame["gain"] == 1
+    assert frame.arrays["gain"] == 1
     black = draw(np.zeros((4, 6, 3), np.float32), nodes(delta=0.01))
-    np.testing.assert_allclose(black["luminance"], [[[0.01]]], rtol=RELATIVE)
+    np.testing.assert_allclose(black.arrays["luminance"], [[[0.01]]], rtol=RELATIVE)
 
 
 @pytest.mark.parametrize("broken", [np.nan, -5.0])
@@ -145,13 +147,13 @@ def test_a_broken_pixel_counts_as_black(draw: Draw, noise: Noise, broken: float)
     picture = noise(12, 9)
     black = picture.copy()
     picture[2, 3], black[2, 3] = broken, 0
-    np.testing.assert_allclose(draw(picture, nodes())["luminance"], [[[log_average(black)]]], rtol=RELATIVE)
+    np.testing.assert_allclose(draw(picture, nodes()).arrays["luminance"], [[[log_average(black)]]], rtol=RELATIVE)
 
 
 def test_an_infinite_pixel_is_only_very_bright(draw: Draw, noise: Noise) -> None:
     picture = noise(12, 9)
     picture[2, 3] = np.inf
-    assert 0 < draw(picture, nodes())["luminance"] < 1e3
+    assert 0 < draw(picture, nodes()).arrays["luminance"] < 1e3
 
 
 # --- over frames ------------------------------------------------------------------------------------------------------
@@ -163,7 +165,7 @@ def grey(value: float) -> Floats:
 
 def over_frames(frames: Frames, picture: Any, text: str, count: int, **options: Any) -> Floats:
     drawn = frames(picture, text, frames=range(1, count + 1), **options)
-    return np.array([float(frame["luminance"][0, 0, 0]) for frame in drawn])
+    return np.array([float(frame.arrays["luminance"][0, 0, 0]) for frame in drawn])
 
 
 def test_reference_adaptation(frames: Frames, shared: Path) -> None:
@@ -218,8 +220,8 @@ def test_shipped_pipelines(session: rg.Session) -> None:
     coming = rg.load("adaptation", size=(48, 32), sets=["exposure.start=2"])
     shown = [session.render(coming, frames=range(1, n + 1), fps=10, taps=taps) for n in (1, 11, 200)]
     assert [frame["image"].mean() for frame in shown] == sorted(frame["image"].mean() for frame in shown)
-    assert shown[0]["exposure.luminance"] == 2
-    at_once, start = float(settled["exposure.luminance"][0, 0, 0]), 2.0
+    assert shown[0].arrays["exposure.luminance"] == 2
+    at_once, start = float(settled.arrays["exposure.luminance"][0, 0, 0]), 2.0
     after = at_once + (start - at_once) * np.exp(-1 / 1.6)  # one second towards the dark
-    np.testing.assert_allclose(shown[1]["exposure.luminance"], after, rtol=1e-5)
+    np.testing.assert_allclose(shown[1].arrays["exposure.luminance"], after, rtol=1e-5)
     assert np.abs(shown[2]["image"].astype(int) - settled["image"]).max() <= 1

@@ -27,7 +27,7 @@ def test_each_layer_counts_once_unless_hidden(session: rg.Session, tmp_path: Pat
     y, x = (np.mgrid[0:32, 0:32] + 0.5) / 16 - 1
     strip = (x > 0) & (x < 0.5)
     right = np.where(strip, 0, 1) + (np.abs(y) < 0.5) + (x < 0) + strip
-    np.testing.assert_array_equal(frame["overdraw.count"][..., 0], right)
+    np.testing.assert_array_equal(frame.arrays["overdraw.count"][..., 0], right)
     assert frame.figures == {"mean": pytest.approx(right.mean()), "maximum": right.max()}
 
 
@@ -35,20 +35,20 @@ def test_each_layer_counts_once_unless_hidden(session: rg.Session, tmp_path: Pat
 @pytest.mark.parametrize("size", [(1, 1), (7, 5), (33, 19), (64, 48)])
 def test_figures_are_of_the_whole_picture(session: rg.Session, size: tuple[int, int]) -> None:
     frame = session.render(rg.load("overdraw", scene="shadow_study", size=size), taps=["overdraw.count"])
-    count = frame["overdraw.count"][..., 0].astype(np.float64)
+    count = frame.arrays["overdraw.count"][..., 0].astype(np.float64)
     assert frame.figures["maximum"] == count.max()
     assert frame.figures["mean"] == pytest.approx(count.mean(), rel=1e-5)
 
 
 def test_behind_a_pre_pass_what_is_seen_is_drawn_once(session: rg.Session) -> None:
     pipeline = rg.load("overdraw", scene="many_lights", size=(96, 54))
-    plain = session.render(pipeline, taps=["overdraw.count"])["overdraw.count"]
+    plain = session.render(pipeline, taps=["overdraw.count"]).arrays["overdraw.count"]
     behind = session.render(pipeline.set("overdraw.depth", "prepass.depth"), taps=["overdraw.count", "prepass.depth"])
-    seen = behind["prepass.depth"] > 0
-    assert (behind["overdraw.count"][seen] >= 1).all()
-    assert (behind["overdraw.count"] > 1).mean() < 0.01  # surfaces that meet
-    assert (behind["overdraw.count"][~seen] == 0).all()
-    assert (plain >= behind["overdraw.count"]).all()
+    seen = behind.arrays["prepass.depth"] > 0
+    assert (behind.arrays["overdraw.count"][seen] >= 1).all()
+    assert (behind.arrays["overdraw.count"] > 1).mean() < 0.01  # surfaces that meet
+    assert (behind.arrays["overdraw.count"][~seen] == 0).all()
+    assert (plain >= behind.arrays["overdraw.count"]).all()
     assert plain.sum() > 1.02 * seen.sum()
 
 
@@ -57,12 +57,12 @@ def test_lights_count_where_they_reach(session: rg.Session) -> None:
     pipeline = rg.load("overdraw", scene="many_lights", size=(48, 27), sets=sets)
     frame = session.render(pipeline, taps=["overdraw.count"])
     lights = len(pipeline.link().graph.facts.lights)
-    count = frame["overdraw.count"]
+    count = frame.arrays["overdraw.count"]
     assert 2 < count.max() <= lights
     assert len(np.unique(count)) > 3
     alone = rg.load("overdraw", scene="shadow_study", size=(48, 27), sets=sets)  # one directional light
     one = session.render(alone, taps=["overdraw.count", "prepass.depth"])
-    np.testing.assert_array_equal(one["overdraw.count"] == 1, one["prepass.depth"] > 0)
+    np.testing.assert_array_equal(one.arrays["overdraw.count"] == 1, one.arrays["prepass.depth"] > 0)
 
 
 def test_the_legend_shows_the_colours_of_the_counts(session: rg.Session) -> None:

@@ -20,7 +20,7 @@ def drawn(session: rg.Session, tap: str, **params: Any) -> tuple[npt.NDArray[Any
     patch = {"nodes": {"shown": node}, "outputs": {"image": "shown.color"}}
     loaded = rg.load("deferred", size=SIZE, scene="lantern", sets=("sun.resolution=17",)).patch(patch)
     frame = session.render(loaded, taps=("display.color", tap), warm_up=False)
-    return frame["image"], frame["display.color"], frame[tap]
+    return frame["image"], frame["display.color"], frame.arrays[tap]
 
 
 def test_normals_stand_in_the_corner(session: rg.Session) -> None:

@@ -62,7 +62,7 @@ def test_surfaces_and_camera_that_move(session: rg.Session, moving: Any, camera:
     now, then = (animate.at(scene, number / 30) for number in (2, 1))
     seen, last = (view_matrices(one.cameras["main"], SIZE) for one in (now, then))
     height, width = SIZE[::-1]
-    depth = frame["depth"][..., 0].astype(np.float64)
+    depth = frame.arrays["depth"][..., 0].astype(np.float64)
     y, x = np.nonzero(depth)
     assert len(x) > 100
     # The picture was moved by the third of the places that frames are taken at, from the 1897th of the sequence on.

@@ -37,10 +37,10 @@ def test_the_picture_is_that_of_every_sample_lit(session: rg.Session, scene: str
     assert (steps_apart(marked, every) > 1).mean() <= 0.001
     blind = session.render(pipeline.set("light.normal_angle", 180).set("light.depth_angle", 90))
     assert (steps_apart(blind, every) > 1).mean() > 0.003, "edges that are not found would not show"
-    edges = marked["edges"] / 255
+    edges = marked.arrays["edges"] / 255
     assert set(np.unique(edges)) == {0, 1}
     assert 0.005 < edges.mean() < 0.4
-    np.testing.assert_allclose(marked["edge_share"], edges.mean(), rtol=1e-6)
+    np.testing.assert_allclose(marked.arrays["edge_share"], edges.mean(), rtol=1e-6)
 
 
 @pytest.mark.nightly(keep=1)
@@ -114,7 +114,7 @@ cameras: {main: {eye: [-0.4, 4, 1], target: [0.4, 0, 0], near: 0.1, far: 60}}
 def test_materials_that_meet_in_a_plane_are_edges(session: rg.Session, tmp_path: Path, changed: str) -> None:
     (tmp_path / "scene.yaml").write_text(INLAID.replace("CHANGED", changed))
     pipeline = rg.load("deferred-msaa", scene=tmp_path / "scene.yaml", size=(48, 32), patches=[UNSHADOWED])
-    edges = session.render(pipeline)["edges"][..., 0] > 0
+    edges = session.render(pipeline).arrays["edges"][..., 0] > 0
     assert edges.any(axis=1).all()
     assert (edges.sum(axis=1) <= 2).all()
 
@@ -150,4 +150,4 @@ def test_memory_is_shared_poisoned_and_shuffled_without_a_trace(session: rg.Sess
     for options in ({"poison": True}, {"poison": True, "shuffle": 5}):
         again = session.render(pipeline, **options)
         for name in ("radiance", "edge_share"):
-            np.testing.assert_array_equal(again[name], plain[name])
+            np.testing.assert_array_equal(again.arrays[name], plain.arrays[name])

@@ -118,7 +118,7 @@ def fragments(session: rg.Session, pipeline: rg.Pipeline) -> list[int]:
 def test_a_light_is_computed_where_it_reaches(session: rg.Session, tmp_path: Path, name: str) -> None:
     """The pixels whose surface lies in the ball or cone, counted in NumPy, and few more: the volume has flat faces."""
     pipeline = rg.load("deferred-stencil-lights", scene=room(tmp_path, LIGHTS[name]), size=SIZE, sets=[FULL])
-    depth = np.asarray(session.render(pipeline, taps=["gbuffer.depth"])["gbuffer.depth"], np.float64)[..., 0]
+    depth = np.asarray(session.render(pipeline, taps=["gbuffer.depth"]).arrays["gbuffer.depth"], np.float64)[..., 0]
     view = view_matrices(next(iter(pipeline.link().scene.cameras.values())), SIZE)
     x = (np.arange(SIZE[0]) + 0.5) / SIZE[0] * 2 - 1
     y = 1 - (np.arange(SIZE[1]) + 0.5) / SIZE[1] * 2

@@ -96,7 +96,7 @@ def test_clear_air_changes_no_bit(session: rg.Session) -> None:
 def distances(session: rg.Session) -> tuple[Floats, Floats]:
     """Return unit rays of the picture of `avenue` and the distance of what they meet; 100 km where that is the sky."""
     frame = session.render(rg.load("fog", size=SIZE), taps=["gbuffer.depth"])
-    depth = np.asarray(frame["gbuffer.depth"], np.float64)[..., 0]
+    depth = np.asarray(frame.arrays["gbuffer.depth"], np.float64)[..., 0]
     eye, target = np.array([0.8, 1.8, 3.5]), np.array([-0.2, 1.5, -8.0])
     forward = (target - eye) / np.linalg.norm(target - eye)
     right = np.cross(forward, [0, 1, 0])

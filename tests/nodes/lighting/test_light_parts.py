@@ -48,7 +48,7 @@ def half_steps(a: Floats, b: Floats, count: float) -> npt.NDArray[np.bool_]:
 
 def drawn(session: rg.Session, pipeline: str, *taps: str) -> list[Floats]:
     frame = session.render(rg.load(pipeline, scene="spheres", size=SIZE), taps=taps)
-    return [np.asarray(frame[tap], np.float64)[..., :3] for tap in taps]
+    return [np.asarray(frame.arrays[tap], np.float64)[..., :3] for tap in taps]
 
 
 @pytest.mark.nightly(keep=3)

@@ -38,6 +38,6 @@ def occlusion(tmp_path: Path, session: rg.Session) -> Occlusion:
         frame = session.render(pipeline, outputs=["occlusion"])
         with session.device.current():
             assert session.device.raw.error() is None
-        return np.asarray(frame["occlusion"][..., 0], np.float64)
+        return np.asarray(frame.arrays["occlusion"][..., 0], np.float64)
 
     return draw

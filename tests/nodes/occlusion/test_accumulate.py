@@ -21,7 +21,7 @@ def as_pipeline(samples: int, **options: Any) -> rg.Pipeline:
 
 def drawn(session: rg.Session, pipeline: rg.Pipeline, first: int, last: int) -> list[dict[str, Any]]:
     frames = session.frames(pipeline, outputs=list(PORTS), frames=range(first, last + 1))
-    return [{name: np.asarray(frame[name][..., 0], np.float64) for name in PORTS} for frame in frames]
+    return [{name: np.asarray(frame.arrays[name][..., 0], np.float64) for name in PORTS} for frame in frames]
 
 
 def test_of_still_frames_it_is_the_plain_mean(session: rg.Session) -> None:
@@ -111,7 +111,7 @@ def test_layers_are_averaged_and_smoothed_each_for_itself(session: rg.Session, t
 
     def frames(light: str) -> list[dict[str, Any]]:
         found = session.frames(pipeline.set("shadows.light", light), outputs=list(OUTPUTS), frames=range(1, 5))
-        return [{name: np.asarray(frame[name][..., 0], np.float64) for name in OUTPUTS} for frame in found]
+        return [{name: np.asarray(frame.arrays[name][..., 0], np.float64) for name in OUTPUTS} for frame in found]
 
     both, right = frames("all"), frames("right")
     raw = np.array([frame["raw"] for frame in both])

@@ -32,7 +32,7 @@ def draw(tmp_path: Path, session: rg.Session) -> Draw:
             patch["outputs"]["x"] = "small.cropped"
         always = ["light.ambient=0", "gbuffer.precision=full"]
         loaded = rg.load(pipeline, scene=tmp_path / "scene.yaml", size=size, sets=[*always, *sets], patches=[patch])
-        return np.asarray(session.render(loaded, outputs=["x"])["x"], np.float64)[..., :3]
+        return np.asarray(session.render(loaded, outputs=["x"]).arrays["x"], np.float64)[..., :3]
 
     return run
 

@@ -32,7 +32,7 @@ def filtered(session: rg.Session, **params: Any) -> tuple[dict[str, Floats], Any
     )
     frame = session.render(pipeline, outputs=list(ports))
     camera = view_matrices(next(iter(pipeline.link().scene.cameras.values())), SIZE)
-    return {name: np.asarray(frame[name][::-1], np.float64) for name in ports}, camera
+    return {name: np.asarray(frame.arrays[name][::-1], np.float64) for name in ports}, camera
 
 
 def test_a_pass_in_numpy(session: rg.Session) -> None:

@@ -51,7 +51,7 @@ def draw(tmp_path: Path, session: rg.Session) -> Draw:
             technique, scene=scene, size=size, sets=[*without, "gbuffer.precision=full", *sets], patches=patches
         )
         frame = session.render(pipeline, outputs=list(ports))
-        return {name: np.asarray(frame[name], np.float64)[..., :3] for name in ports}
+        return {name: np.asarray(frame.arrays[name], np.float64)[..., :3] for name in ports}
 
     return run
 
@@ -311,7 +311,7 @@ def test_one_pass_finds_what_two_find(draw: Draw, session: rg.Session) -> None:
         rg.load(
             "ssao-disc", scene="cornell_box", size=(121, 121), sets=["ao.samples=64", "ao.form=disc"], patches=[patch]
         )
-    )["open"]
+    ).arrays["open"]
     difference = both["open"][..., 0] - np.asarray(disc, np.float64)[..., 0]
     assert disc.min() < 0.5
     assert np.sqrt(np.mean(difference**2)) < 0.05
@@ -434,7 +434,7 @@ def test_far_light_leaves_occlusion_as_it_is(session: rg.Session, shared: Path, 
     pipeline = rg.load("ssil", scene=here / "scene.glb", size=size, sets=(f"gi.radius={radius}",))
     frame = session.render(pipeline, outputs=(), taps=("gi.occlusion",), warm_up=False)
     judged = (truth["depth"] > 0) & ~truth["edge"]
-    off = frame["gi.occlusion"][..., 0][judged] - truth[f"ao_r{radius}"][judged].astype(np.float64)
+    off = frame.arrays["gi.occlusion"][..., 0][judged] - truth[f"ao_r{radius}"][judged].astype(np.float64)
     assert np.sqrt(np.mean(off**2)) < 0.09
     assert abs(off.mean()) < 0.045
 
@@ -481,6 +481,6 @@ def test_back_faces_look_away(draw: Draw, session: rg.Session) -> None:
     """Normals of a box's far sides are its own, and lie behind what is seen."""
     patch = {"outputs": {"back": "back.depth", "front": "gbuffer.depth", "normal": "back.normal"}}
     frame = session.render(rg.load("ssgi-back-faces", scene="shadow_study", size=(96, 72), patches=[patch]))
-    there = frame["back"][..., 0] > 0
+    there = frame.arrays["back"][..., 0] > 0
     assert there.mean() > 0.05
-    assert (frame["back"][..., 0][there] < frame["front"][..., 0][there]).mean() > 0.95
+    assert (frame.arrays["back"][..., 0][there] < frame.arrays["front"][..., 0][there]).mean() > 0.95

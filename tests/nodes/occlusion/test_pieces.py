@@ -152,7 +152,7 @@ def same_surface(offset: Floats, normal: Floats, neighbour: Floats) -> Floats:
 
 
 def flipped(frame: rg.Frame, name: str) -> Floats:
-    return np.asarray(frame[name][::-1], np.float64)
+    return np.asarray(frame.arrays[name][::-1], np.float64)
 
 
 def blur_by_hand(values: Floats, surfaces: Floats, where: Floats, axis: int) -> Floats:

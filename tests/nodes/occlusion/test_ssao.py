@@ -335,7 +335,11 @@ def test_occlusion_stays_where_it_is_when_the_eye_goes_back(
         pipeline = rg.load(f"ssao-{technique}", scene=file, size=(240, 180), sets=sets, patches=[patch])
         frame = session.render(pipeline)
         view = view_matrices(next(iter(pipeline.link().scene.cameras.values())), (240, 180))
-        return frame["occlusion"][::-1, :, 0].astype(float), frame["depth"][::-1, :, 0].astype(float), view
+        return (
+            frame.arrays["occlusion"][::-1, :, 0].astype(float),
+            frame.arrays["depth"][::-1, :, 0].astype(float),
+            view,
+        )
 
     (near, depth, close), (far, far_depth, away) = look(4), look(6)
     rows, columns = np.nonzero(depth > 0)
@@ -377,8 +381,8 @@ def test_ambient_light_is_scaled(session: rg.Session, technique: str) -> None:
         )
 
     with_it, without = radiance(), radiance("light.occlusion=null")
-    expected = without["radiance"][..., :3] * with_it["occlusion"][..., :1]
-    assert with_it["occlusion"].min() < 0.7
+    expected = without["radiance"][..., :3] * with_it.arrays["occlusion"][..., :1]
+    assert with_it.arrays["occlusion"].min() < 0.7
     np.testing.assert_allclose(with_it["radiance"][..., :3], expected, rtol=2e-3, atol=1e-5)
 
 

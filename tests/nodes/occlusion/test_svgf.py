@@ -47,7 +47,7 @@ def frames(session: rg.Session, room: Path, count: int, *sets: str, still: int |
         patches=[patch],
     )
     shown = session.frames(pipeline, frames=range(1, count + 1), outputs=tuple(ports), warm_up=False, still=still)
-    return [{name: np.asarray(frame[name], np.float64)[..., :3] for name in ports} for frame in shown]
+    return [{name: np.asarray(frame.arrays[name], np.float64)[..., :3] for name in ports} for frame in shown]
 
 
 @pytest.fixture(scope="module")

@@ -25,7 +25,7 @@ def draw(session: rg.Session, scene: Path | str, *sets: str, size: tuple[int, in
         patches=[{"outputs": {"image": None, "radiance": None, **ports}}],
     )
     frame = session.render(pipeline, outputs=list(ports))
-    return {name: np.asarray(frame[name], np.float64)[..., :3] for name in ports}
+    return {name: np.asarray(frame.arrays[name], np.float64)[..., :3] for name in ports}
 
 
 PARALLEL = """scene: 1
@@ -174,7 +174,7 @@ def test_both_at_once_are_occlusion_and_light(session: rg.Session) -> None:
     rays = ("ao.type=traced_occlusion", "ao.radius=0.3", "ao.samples=64")
     patch = {"outputs": {"open": "ao.occlusion"}}
     pipeline = rg.load("ssao-disc", scene="cornell_box", size=(32, 24), sets=rays, patches=[patch])
-    apart = np.asarray(session.render(pipeline, outputs=["open"])["open"], np.float64)[..., 0]
+    apart = np.asarray(session.render(pipeline, outputs=["open"]).arrays["open"], np.float64)[..., 0]
     assert apart.min() < 0.6
     assert np.abs(found["open"][..., 0] - apart).max() < 0.02
 

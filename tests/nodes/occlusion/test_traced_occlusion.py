@@ -35,7 +35,7 @@ def _distances(count: int) -> npt.NDArray[np.float64]:
 def test_a_tall_wall_hides_a_segment_of_the_disc_of_directions(session: rg.Session, tmp_path: Path) -> None:
     """Cosine-weighted directions are uniform on the disc below the hemisphere; those with x < -d/R meet the wall."""
     radius = 1.5
-    found = draw(session, tmp_path, 40.0, f"ao.radius={radius}", "ao.samples=256")["ao.occlusion"][..., 0]
+    found = draw(session, tmp_path, 40.0, f"ao.radius={radius}", "ao.samples=256").arrays["ao.occlusion"][..., 0]
     c = np.clip(_distances(32) / radius, 0, 1)
     expected = 1 - (np.arccos(c) - c * np.sqrt(1 - c * c)) / np.pi
     assert np.abs(found.mean(axis=0) - expected).max() < 0.006
@@ -44,7 +44,7 @@ def test_a_tall_wall_hides_a_segment_of_the_disc_of_directions(session: rg.Sessi
 
 def test_a_low_wall_hides_its_form_factor(session: rg.Session, tmp_path: Path) -> None:
     """Of a long wall of height h at the distance d, seen without a limit: (1 - d / sqrt(d² + h²)) / 2."""
-    found = draw(session, tmp_path, 1.0, "ao.radius=1000", "ao.samples=256")["ao.occlusion"][..., 0]
+    found = draw(session, tmp_path, 1.0, "ao.radius=1000", "ao.samples=256").arrays["ao.occlusion"][..., 0]
     d = _distances(32)
     assert np.abs(found.mean(axis=0) - (1 - 0.5 * (1 - d / np.sqrt(d**2 + 1)))).max() < 0.006
 
@@ -62,11 +62,11 @@ def test_bent_normals_are_the_mean_open_direction(session: rg.Session, tmp_path:
 
 
 def test_frames_have_other_rays_and_a_common_mean(session: rg.Session, tmp_path: Path) -> None:
-    exact = draw(session, tmp_path, 1.0, "ao.radius=1000", "ao.samples=1024")["ao.occlusion"][..., 0]
+    exact = draw(session, tmp_path, 1.0, "ao.radius=1000", "ao.samples=1024").arrays["ao.occlusion"][..., 0]
     sets = ("ao.type=traced_occlusion", "ao.radius=1000", "ao.samples=4")
     pipeline = rg.load("ssao-gtao", scene=tmp_path / "scene.yaml", size=(32, 16), sets=sets)
     frames = [
-        frame["ao.occlusion"][..., 0]
+        frame.arrays["ao.occlusion"][..., 0]
         for frame in pipeline.frames(session=session, frames=range(1, 33), outputs=(), taps=("ao.occlusion",))
     ]
     single = np.sqrt(np.mean((frames[0] - exact) ** 2))
@@ -78,6 +78,6 @@ def test_frames_have_other_rays_and_a_common_mean(session: rg.Session, tmp_path:
 @pytest.mark.parametrize("output", ["occlusion", "bent_normal"])
 def test_a_reduced_scale_is_interpolated(session: rg.Session, tmp_path: Path, output: str) -> None:
     sets = ("ao.radius=1.5", "ao.samples=256")
-    whole = draw(session, tmp_path, 40.0, *sets)[f"ao.{output}"]
-    half = draw(session, tmp_path, 40.0, *sets, "ao.scale=0.5")[f"ao.{output}"]
+    whole = draw(session, tmp_path, 40.0, *sets).arrays[f"ao.{output}"]
+    half = draw(session, tmp_path, 40.0, *sets, "ao.scale=0.5").arrays[f"ao.{output}"]
     assert np.abs(whole - half)[:, 2:-2].mean() < 0.02

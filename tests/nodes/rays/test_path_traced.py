@@ -31,7 +31,7 @@ def traced(
     for name, value in settings.items():
         pipeline = pipeline.set(name if "." in name else f"light.{name}", value)
     shown = session.frames(pipeline, frames=range(1, frames + 1), warm_up=False, still=True)
-    return [{name: frame[name].astype(np.float64) for name in OUTPUTS} for frame in shown]
+    return [{name: frame.arrays[name].astype(np.float64) for name in OUTPUTS} for frame in shown]
 
 
 def light(session: rg.Session, scene: str | Path, settings: dict[str, Any], **options: Any) -> Image:
@@ -481,7 +481,7 @@ def test_frames_add_samples_until_something_changes(session: rg.Session, tmp_pat
     moving = "objects: {one: {shape: box}}\nkeyframes: {objects.one.at: {0: [0, 0, 0], 1: [0, 1, 0]}}\n"
     pipeline = rg.load("path-traced", scene=scene_file(tmp_path, moving), size=(8, 8))
     frames = session.frames(pipeline, frames=range(1, 4), warm_up=False)
-    assert [frame["samples_taken"].mean() for frame in frames] == [16, 16, 16]
+    assert [frame.arrays["samples_taken"].mean() for frame in frames] == [16, 16, 16]
 
 
 # Parts ---------------------------------------------------------------------------------------------------------------

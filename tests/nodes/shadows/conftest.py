@@ -62,7 +62,7 @@ def look(session: rg.Session) -> Callable[..., Looked]:
         loaded = rg.load(pipeline, size=size, scene=scene, sets=(*fixed, *sets))
         taps = ("sun.shadow_map", "shadows.visibility", "gbuffer.depth")
         frame = session.render(loaded, outputs=(), taps=taps, warm_up=False)
-        depth, visibility, seen = (np.asarray(frame[tap], np.float64)[..., ::-1, :, 0] for tap in taps)
+        depth, visibility, seen = (np.asarray(frame.arrays[tap], np.float64)[..., ::-1, :, 0] for tap in taps)
         depth, seen = 1 - depth, 1 - seen
         stage = loaded.link().scene
         camera = view_matrices(next(iter(stage.cameras.values())), size)

@@ -58,10 +58,10 @@ def test_spans_share_the_picture_and_are_blended(session: rg.Session, tmp_path: 
     loaded = rg.load(tmp_path / "spans.yaml", scene=tmp_path / "floor.yaml", size=(32, 48), plugins=[tmp_path])
     frame = session.render(loaded, outputs=(), taps=("shadows.visibility", "prepass.depth"))
     view = view_matrices(next(iter(loaded.link().scene.cameras.values())), (32, 48))
-    depth = frame["prepass.depth"][..., 0].astype(float)
+    depth = frame.arrays["prepass.depth"][..., 0].astype(float)
     ndc = 1 - 2 * depth
     distance = view.projection[2, 3] / (view.projection[2, 2] + ndc)
-    found = frame["shadows.visibility"][0, ..., 0]
+    found = frame.arrays["shadows.visibility"][0, ..., 0]
     seen = depth > 0
     assert distance[seen].min() < 8 < 12 < distance[seen].max()
     np.testing.assert_allclose(found[seen], np.clip((distance[seen] - 9) / 1.5, 0, 1), atol=2e-3)
@@ -113,7 +113,7 @@ def test_a_projective_view_of_a_directional_light(
         loaded = rg.load("forward-prepass", scene="shadow_study", size=(240, 160), sets=settings, plugins=[tmp_path])
         loaded = loaded.with_camera("eye=5,5,7.5 target=0,0.7,0 fov=40")
         frame = session.render(loaded, outputs=(), taps=("shadows.visibility",))
-        pictures.append(frame["shadows.visibility"][0, ..., 0].astype(float))
+        pictures.append(frame.arrays["shadows.visibility"][0, ..., 0].astype(float))
     parallel, warped = pictures
     assert 0.05 < (parallel < 0.5).mean() < 0.6
     inside = np.ones_like(parallel, bool)  # pixels with all of one kind around them
@@ -153,8 +153,8 @@ def test_flat_faces_are_wholly_lit(session: rg.Session, tmp_path: Path, kind: st
     sets = (f"shadows.taps={taps}", "sun.resolution=512", "sun.light=all")
     loaded = rg.load("forward-prepass", scene=scene, size=(160, 120), sets=sets)
     frame = session.render(loaded, outputs=(), taps=("shadows.visibility", "prepass.depth"))
-    seen = frame["prepass.depth"][..., 0] > 0
+    seen = frame.arrays["prepass.depth"][..., 0] > 0
     assert seen.mean() > 0.4
     for shift in ((0, 1), (0, -1), (1, 0), (-1, 0)):  # a normal from depth needs neighbours
-        seen &= np.roll(frame["prepass.depth"][..., 0] > 0, shift, (0, 1))
-    assert frame["shadows.visibility"][0, ..., 0][seen].min() > 0.999
+        seen &= np.roll(frame.arrays["prepass.depth"][..., 0] > 0, shift, (0, 1))
+    assert frame.arrays["shadows.visibility"][0, ..., 0][seen].min() > 0.999

@@ -40,7 +40,7 @@ def visibility(session: rg.Session, kind: str, *sets: str, **options: Any) -> Fl
     """What the node makes in screen space, of the first light."""
     loaded = rg.load("forward-prepass", sets=(f"shadows.type={kind}", *sets), **options)
     frame = session.render(loaded, outputs=(), taps=("shadows.visibility",), warm_up=False)
-    return np.asarray(frame["shadows.visibility"][0, ..., 0], np.float64)
+    return np.asarray(frame.arrays["shadows.visibility"][0, ..., 0], np.float64)
 
 
 # --- against ray casting ---------------------------------------------------------------------------------------------
@@ -103,7 +103,7 @@ def test_what_faces_the_light_has_no_acne(session: rg.Session, tmp_path: Path, k
     )
     frame = session.render(loaded, outputs=(), taps=("shadows.visibility", "prepass.depth"), warm_up=False)
     camera = view_matrices(loaded.link().scene.cameras["main"], (160, 120))
-    depth = np.asarray(frame["prepass.depth"][..., 0], np.float64)
+    depth = np.asarray(frame.arrays["prepass.depth"][..., 0], np.float64)
     y, x = np.mgrid[0:120, 0:160] + 0.5
     clip = np.stack([x / 80 - 1, 1 - y / 60, depth, np.ones_like(depth)], axis=-1)
     world = clip @ np.linalg.inv(reversed_projection(camera) @ camera.view).T
@@ -120,7 +120,7 @@ def test_what_faces_the_light_has_no_acne(session: rg.Session, tmp_path: Path, k
     on_floor = np.abs(points[..., 1]) < 1e-3
     clear = faces & (~on_floor | (enter > leave) | (leave < 0))
     assert clear.sum() > 3000
-    assert frame["shadows.visibility"][0, ..., 0][clear].min() > 0.95
+    assert frame.arrays["shadows.visibility"][0, ..., 0][clear].min() > 0.95
 
 
 # --- both forms ------------------------------------------------------------------------------------------------------

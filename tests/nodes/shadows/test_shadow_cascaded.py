@@ -174,7 +174,7 @@ def wrong_share(session: rg.Session, shared: Path, *sets: str) -> float:
     given, masks = json.loads((here / "case.json").read_text())["camera"], np.load(here / "masks.npz")
     size = (given["width"], given["height"])
     loaded = rg.load("forward-prepass", scene=here / "scene.glb", size=size, sets=sets)
-    lit = session.render(loaded, outputs=(), taps=("shadows.visibility",), warm_up=False)["shadows.visibility"]
+    lit = session.render(loaded, outputs=(), taps=("shadows.visibility",), warm_up=False).arrays["shadows.visibility"]
     judged = np.isin(masks["cls"], (1, 2)) & ~masks["edge"].astype(bool)
     return float(100 * ((lit[0, ..., 0] > 0.5) != (masks["cls"] == 1))[judged].mean())
 
@@ -201,7 +201,7 @@ def test_defaults_suit_long_and_short_scenes(session: rg.Session, pipeline: str,
         frame = session.render(loaded, outputs=(), taps=("shadows.visibility", "gbuffer.normal"), warm_up=False)
         sun = next(light for light in loaded.link().scene.lights if light.type == "directional")
         facing = frame["gbuffer.normal"][..., :3] @ -np.asarray(sun.direction) > 0.2
-        return np.where(facing, frame["shadows.visibility"][0, ..., 0] > 0.5, True)
+        return np.where(facing, frame.arrays["shadows.visibility"][0, ..., 0] > 0.5, True)
 
     fine = ("sun.cascades=8", "sun.resolution=2048", "sun.weight=0.95", "shadows.taps=1", "shadows.normal_offset=0.5")
     truth, found = lit("shadow-cascaded", *fine), lit(pipeline)
@@ -231,7 +231,7 @@ def test_maps_hold_the_same_when_the_eye_moves(session: rg.Session, tmp_path: Pa
     sets = ("sun.type=shadow_cascaded", "sun.resolution=256")
     loaded = rg.load("forward-prepass", scene=tmp_path / "moving.yaml", size=(64, 36), sets=sets)
     first, second = (
-        np.array(frame["sun.shadow_map"][..., 0])
+        np.array(frame.arrays["sun.shadow_map"][..., 0])
         for frame in session.frames(loaded, frames=range(1, 9, 7), outputs=(), taps=("sun.shadow_map",))
     )
     moves = []

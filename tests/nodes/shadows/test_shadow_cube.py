@@ -39,7 +39,9 @@ def test_one_pass_draws_what_many_do(session: rg.Session, tmp_path: Path) -> Non
     for kind in ("shadow_map", "shadow_cube"):
         sets = (f"sun.type={kind}", "sun.light=all", "sun.resolution=128")
         loaded = rg.load("forward", scene=tmp_path / "scene.yaml", size=(32, 24), sets=sets)
-        maps.append(session.render(loaded, outputs=(), taps=("sun.shadow_map",), warm_up=False)["sun.shadow_map"])
+        maps.append(
+            session.render(loaded, outputs=(), taps=("sun.shadow_map",), warm_up=False).arrays["sun.shadow_map"]
+        )
         passes = [step for step in loaded.plan().schedule.steps if step.node == "sun"]
         assert len(passes) == (8 if kind == "shadow_map" else 1)
     assert maps[0].shape == (8, 128, 128, 1)
@@ -53,6 +55,6 @@ def test_a_bulb_in_a_room(session: rg.Session, shared: Path) -> None:
     given, masks = json.loads((here / "case.json").read_text())["camera"], np.load(here / "masks.npz")
     sets = ("sun.type=shadow_cube", "shadows.taps=1")
     loaded = rg.load("forward-prepass", scene=here / "scene.glb", size=(given["width"], given["height"]), sets=sets)
-    lit = session.render(loaded, outputs=(), taps=("shadows.visibility",), warm_up=False)["shadows.visibility"]
+    lit = session.render(loaded, outputs=(), taps=("shadows.visibility",), warm_up=False).arrays["shadows.visibility"]
     judged = np.isin(masks["cls"], (1, 2)) & ~masks["edge"].astype(bool)
     assert ((lit[0, ..., 0] > 0.5) != (masks["cls"] == 1))[judged].mean() <= 2e-4

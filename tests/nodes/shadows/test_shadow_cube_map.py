@@ -27,7 +27,7 @@ cameras: {main: {eye: [3, 4, 5], target: [0, 0.4, 0], fov_y_degrees: 45, near: 0
 
 def visibility(session: rg.Session, name: str, *sets: str, **options: Any) -> npt.NDArray[Any]:
     frame = session.render(rg.load(name, sets=sets, **options), outputs=(), taps=("shadows.visibility",), warm_up=False)
-    return np.asarray(frame["shadows.visibility"][..., 0])
+    return np.asarray(frame.arrays["shadows.visibility"][..., 0])
 
 
 @pytest.mark.slow

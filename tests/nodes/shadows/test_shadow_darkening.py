@@ -23,7 +23,7 @@ def test_what_lies_in_volumes_is_darker_by_the_factor_once_a_light(session: rg.S
         rg.load("shadow-volumes-auto", size=size, scene=scene, sets=(LIGHTS,)),
         outputs=(),
         taps=["shadows.visibility"],
-    )["shadows.visibility"]
+    ).arrays["shadows.visibility"]
     hidden = (seen[..., 0] < 0.5).sum(axis=0)
     assert hidden.max() > 1
     np.testing.assert_allclose(dark[..., :3], plain[..., :3] * 0.75 ** hidden[..., None], rtol=1e-2, atol=1e-5)

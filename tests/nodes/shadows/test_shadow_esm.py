@@ -54,7 +54,7 @@ def test_a_long_range_costs_nothing(session: rg.Session, shared: Path) -> None:
     sets = ("shadows.type=shadow_esm", "shadows.radius=1")
     loaded = rg.load("forward-prepass", scene=here / "scene.glb", size=(camera["width"], camera["height"]), sets=sets)
     frame = session.render(loaded, outputs=(), taps=("shadows.visibility",), warm_up=False)
-    lit = frame["shadows.visibility"][0, ..., 0]
+    lit = frame.arrays["shadows.visibility"][0, ..., 0]
     away = ~masks["edge"].astype(bool)
     assert lit[away & (masks["cls"] == 2)].mean() < 0.02
     assert lit[away & (masks["cls"] == 1)].mean() > 0.999

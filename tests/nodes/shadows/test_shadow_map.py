@@ -31,7 +31,7 @@ def test_what_has_one_side_casts_from_both(session: rg.Session, tmp_path: Path, 
     frame = session.render(
         rg.load("forward-prepass", scene=scene, size=(60, 40), sets=sets), taps=("shadows.visibility",)
     )
-    lit = frame["shadows.visibility"][0, ..., 0]
+    lit = frame.arrays["shadows.visibility"][0, ..., 0]
     assert lit[20, 30] == 0
     assert lit[38, 30] == 1
 
@@ -43,7 +43,7 @@ def test_a_wide_cone_wastes_no_texels(session: rg.Session) -> None:
     for name, sets in (("shadow-volumes-auto", ()), ("shadow-map", ("sun.resolution=512",))):
         taps = ("shadows.visibility",)
         frame = session.render(rg.load(name, sets=sets, **sizes), outputs=(), taps=taps, warm_up=False)
-        found.append(frame["shadows.visibility"][0, ..., 0])
+        found.append(frame.arrays["shadows.visibility"][0, ..., 0])
     assert (found[0] < 0.5).mean() > 0.05
     assert ((found[0] < 0.5) != (found[1] < 0.5)).mean() < 1.5e-3  # 0.7 % without a fit
 
@@ -69,7 +69,7 @@ def test_of_what_is_solid_the_sun_sees_the_same_by_its_front_faces_alone(
         (tmp_path / f"{name}.yaml").write_text(SOLIDS)
         pipeline = rg.load("forward", scene=tmp_path / f"{name}.yaml", size=(32, 20), sets=["sun.resolution=256"])
         drawn = session.render(pipeline, outputs=(), taps=("sun.shadow_map",), warm_up=False)
-        maps.append(drawn["sun.shadow_map"])
+        maps.append(drawn.arrays["sun.shadow_map"])
         made: Any = session.cache.active
         drawn_apart = next(step.draws for step in made.steps[0] if step.step.node == "sun")
         assert len(drawn_apart) == (4 if name == "front" else 3)  # the mirrored knot and the mask are apart in any case
@@ -84,5 +84,5 @@ def test_a_lamp_within_a_solid_globe_lights_nothing(session: rg.Session, tmp_pat
     (tmp_path / "globe.yaml").write_text(scene.replace("TURN", "0"))
     sets = ("sun.light=all", "sun.resolution=64")
     pipeline = rg.load("forward-prepass", scene=tmp_path / "globe.yaml", size=(24, 16), sets=sets)
-    lit = session.render(pipeline, outputs=(), taps=("shadows.visibility",), warm_up=False)["shadows.visibility"]
+    lit = session.render(pipeline, outputs=(), taps=("shadows.visibility",), warm_up=False).arrays["shadows.visibility"]
     assert lit[0, 14].max() == 0

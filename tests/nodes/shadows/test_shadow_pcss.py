@@ -105,7 +105,7 @@ def draw(session: rg.Session, folder: Path, kind: str, width: float) -> tuple[Fl
     loaded = rg.load("forward-prepass", scene=folder / "scene.yaml", size=SIZE, sets=sets)
     frame = session.render(loaded, outputs=(), taps=("shadows.visibility", "prepass.depth"), warm_up=False)
     view = view_matrices(next(iter(loaded.link().scene.cameras.values())), SIZE)
-    lit, depth = (np.asarray(frame[tap], np.float64) for tap in ("shadows.visibility", "prepass.depth"))
+    lit, depth = (np.asarray(frame.arrays[tap], np.float64) for tap in ("shadows.visibility", "prepass.depth"))
     x, y = np.meshgrid((np.arange(SIZE[0]) + 0.5) / SIZE[0] * 2 - 1, 1 - (np.arange(SIZE[1]) + 0.5) / SIZE[1] * 2)
     clip = np.stack([x, y, 1 - 2 * depth[..., 0], np.ones_like(x)], -1)
     world = clip @ np.linalg.inv(view.projection @ view.view).T

@@ -39,7 +39,7 @@ def drawn(session: rg.Session, folder: Path, *sets: str, extra: str = "", text: 
     (folder / "s.yaml").write_text(text.replace("EXTRA", extra))
     loaded = rg.load("shadow-planar", scene=folder / "s.yaml", size=SIZE, sets=("shadows.light=[sun, lamp]", *sets))
     frame = session.render(loaded, outputs=(), taps=["shadows.visibility", "gbuffer.depth"], warm_up=False)
-    return frame["shadows.visibility"][..., 0], np.asarray(frame["gbuffer.depth"], np.float64)[..., 0]
+    return frame.arrays["shadows.visibility"][..., 0], np.asarray(frame.arrays["gbuffer.depth"], np.float64)[..., 0]
 
 
 def test_the_matrix_is_the_documents(shared: Path) -> None:

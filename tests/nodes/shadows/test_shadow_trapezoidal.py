@@ -118,7 +118,7 @@ def test_a_long_field(session: rg.Session, shared: Path, kind: str) -> None:
         )
         loaded = rg.load("forward-prepass", scene=here / "scene.glb", size=(given["width"], given["height"]), sets=sets)
         frame = session.render(loaded, outputs=(), taps=("shadows.visibility",), warm_up=False)
-        wrong.append(((frame["shadows.visibility"][0, ..., 0] > 0.5) != (masks["cls"] == 1))[judged].mean())
+        wrong.append(((frame.arrays["shadows.visibility"][0, ..., 0] > 0.5) != (masks["cls"] == 1))[judged].mean())
     assert wrong[0] < 0.002
     assert wrong[0] < 0.5 * wrong[1]
 
@@ -141,7 +141,7 @@ def test_spot_lights_are_warped_too(session: rg.Session, tmp_path: Path) -> None
         sets = (f"sun.type={sun}", "sun.resolution=1024", "shadows.taps=1")
         loaded = rg.load("forward-prepass", scene=tmp_path / "spot.yaml", size=(120, 80), sets=sets)
         frame = session.render(loaded, outputs=(), taps=("shadows.visibility", "sun.shadow_map"), warm_up=False)
-        seen.append((frame["shadows.visibility"][0, ..., 0], frame["sun.shadow_map"]))
+        seen.append((frame.arrays["shadows.visibility"][0, ..., 0], frame.arrays["sun.shadow_map"]))
     assert not np.array_equal(seen[0][1], seen[1][1])
     assert (seen[0][0] < 0.5).mean() > 0.02
     assert (np.abs(seen[0][0] - seen[1][0]) > 0.5).mean() < 0.01

@@ -113,7 +113,7 @@ def wrong(session: rg.Session, tmp_path: Path, lit: dict[tuple[bytes, str], Mask
         loaded = rg.load(PIPELINE, scene=tmp_path / "s.yaml", size=SIZE, sets=("shadows.light=all", *sets))
         frame = session.render(loaded, outputs=(), taps=["shadows.visibility", "gbuffer.depth"], warm_up=False)
         scene = loaded.link().scene
-        depth = np.asarray(frame["gbuffer.depth"], np.float64)[..., 0]
+        depth = np.asarray(frame.arrays["gbuffer.depth"], np.float64)[..., 0]
         positions, seen = seen_positions(scene, depth)
         shares = []
         for layer, light in enumerate(scene.lights):
@@ -125,7 +125,7 @@ def wrong(session: rg.Session, tmp_path: Path, lit: dict[tuple[bytes, str], Mask
                 judged &= np.linalg.norm(positions - light.position, axis=-1) < light.range
             assert judged.mean() > 0.03
             assert dark <= 1 - lit[key][judged].mean() < 0.9, "something is in shadow, and not everything"
-            shares.append(float(((frame["shadows.visibility"][layer, ..., 0] > 0.5) != lit[key])[judged].mean()))
+            shares.append(float(((frame.arrays["shadows.visibility"][layer, ..., 0] > 0.5) != lit[key])[judged].mean()))
         return shares
 
     return measure
@@ -248,7 +248,7 @@ def test_an_open_caster_is_refused_or_left_out(session: rg.Session, tmp_path: Pa
 def test_without_casters_or_lights_all_is_lit(session: rg.Session, tmp_path: Path) -> None:
     (tmp_path / "s.yaml").write_text("scene: 1\nobjects: {g: {shape: plane, casts_shadow: false}}\n")
     frame = session.render(rg.load(PIPELINE, scene=tmp_path / "s.yaml", size=(8, 8)), taps=["shadows.visibility"])
-    assert (frame["shadows.visibility"] == 1).all()
+    assert (frame.arrays["shadows.visibility"] == 1).all()
     (tmp_path / "t.yaml").write_text("scene: 1\nobjects: {g: {shape: box}}\nlights: {l: {type: point}}\n")
     frame = session.render(rg.load(PIPELINE, scene=tmp_path / "t.yaml", size=(8, 8), sets=("shadows.light=auto",)))
     assert frame["image"].any()
@@ -275,7 +275,7 @@ def test_the_reference_is_met_at_every_pixel(
     loaded = rg.load(PIPELINE, scene=here / "scene.glb", size=(camera["width"], camera["height"]), sets=sets)
     frame = session.render(loaded, outputs=(), taps=["shadows.visibility"], warm_up=False)
     judged = np.isin(masks["cls"], (1, 2, 3)) & ~masks["edge"].astype(bool)
-    share = ((frame["shadows.visibility"][0, ..., 0] > 0.5) != (masks["cls"] == 1))[judged].mean()
+    share = ((frame.arrays["shadows.visibility"][0, ..., 0] > 0.5) != (masks["cls"] == 1))[judged].mean()
     if method == "zpass" and case == "dir_camera_in_shadow":
         assert share > 0.5
     else:

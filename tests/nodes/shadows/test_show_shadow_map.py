@@ -45,7 +45,7 @@ def test_layers_follow_distance(session: rg.Session) -> None:
     """Four cascades on a road: their colours come one after the other with growing distance, and are blended."""
     picture = painted(session, "avenue", "sun.type=shadow_cascaded", "sun.resolution=128", shown="layers")
     colors = np.array([(0.90, 0.25, 0.20), (0.25, 0.75, 0.30), (0.25, 0.45, 0.95), (0.95, 0.80, 0.20)])
-    depth = picture["gbuffer.depth"][..., 0].astype(float)
+    depth = picture.arrays["gbuffer.depth"][..., 0].astype(float)
     apart = np.abs(picture["image"][:, :, np.newaxis, :3] / 255 - colors).max(axis=-1)
     layers = [depth[(apart[..., layer] < 3e-3) & (depth > 0)] for layer in range(4)]
     assert min(map(len, layers)) > 5

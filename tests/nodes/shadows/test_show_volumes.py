@@ -29,9 +29,9 @@ def test_an_odd_number_of_faces_lies_before_what_is_in_shadow(session: rg.Sessio
     halving = loaded.set("volumes.parts", "volumes").set("volumes.tint", (0, 0, 0)).set("volumes.opacity", 0.5)
     frame = session.render(halving, taps=["display.color", "shadows.visibility", "gbuffer.depth"])
     before, after = frame["display.color"][..., 0].astype(float), frame["image"][..., 0].astype(float)
-    seen = (frame["gbuffer.depth"][..., 0] > 0) & (before > 60)
+    seen = (frame.arrays["gbuffer.depth"][..., 0] > 0) & (before > 60)
     faces = np.round(np.log2(before[seen] / np.maximum(after[seen], 1)))
-    lit = frame["shadows.visibility"][0, ..., 0][seen] > 0.5
+    lit = frame.arrays["shadows.visibility"][0, ..., 0][seen] > 0.5
     assert set(faces) == {0, 1, 2}
     assert (faces == 2).sum() > 10
     assert np.array_equal(faces % 2 == 1, ~lit)
@@ -44,7 +44,7 @@ def test_silhouettes_run_where_light_grazes(session: rg.Session, tmp_path: Path)
     drawn = (frame["image"] != frame["display.color"]).any(axis=-1)
     camera = view_matrices(next(iter(loaded.link().scene.cameras.values())), SIZE)
     y, x = np.mgrid[0 : SIZE[1], 0 : SIZE[0]]
-    depth = frame["gbuffer.depth"][..., 0].astype(float)
+    depth = frame.arrays["gbuffer.depth"][..., 0].astype(float)
     clip = np.stack([(x + 0.5) / SIZE[0] * 2 - 1, 1 - (y + 0.5) / SIZE[1] * 2, depth, np.ones_like(depth)], -1)
     world = clip[drawn & (depth > 0)] @ np.linalg.inv(reversed_projection(camera) @ camera.view).T
     from_middle = world[:, :3] / world[:, 3:] - (0.2, 1.4, 0)

@@ -34,8 +34,8 @@ def draw(session: rg.Session, folder: Path, lights: str, *sets: str) -> tuple[Fl
     (folder / "scene.yaml").write_text(SCENE.replace("LIGHTS", lights))
     pipeline = rg.load("deferred", scene=folder / "scene.yaml", size=SIZE, sets=("shadows.type=traced_shadows", *sets))
     frame = session.render(pipeline, outputs=(), taps=("shadows.visibility", "gbuffer.depth"))
-    visibility = np.asarray(frame["shadows.visibility"], np.float64)[..., 0].reshape(-1, SIZE[1], SIZE[0])
-    window = np.asarray(frame["gbuffer.depth"], np.float64)[..., 0]
+    visibility = np.asarray(frame.arrays["shadows.visibility"], np.float64)[..., 0].reshape(-1, SIZE[1], SIZE[0])
+    window = np.asarray(frame.arrays["gbuffer.depth"], np.float64)[..., 0]
     camera = view_matrices(next(iter(pipeline.link().scene.cameras.values())), SIZE)
     y, x = np.mgrid[0 : SIZE[1], 0 : SIZE[0]]
     clip = np.stack(
@@ -120,7 +120,7 @@ def test_a_half_plane_under_a_disc_of_light_has_the_area_of_a_segment(session: r
     sets = ("shadows.type=traced_shadows", f"shadows.angle={angle}", "shadows.samples=256")
     pipeline = rg.load("deferred", scene=tmp_path / "scene.yaml", size=(32, 8), sets=sets)
     frame = session.render(pipeline, outputs=(), taps=("shadows.visibility",))
-    lit = np.asarray(frame["shadows.visibility"], np.float64).reshape(8, 32).mean(axis=0)
+    lit = np.asarray(frame.arrays["shadows.visibility"], np.float64).reshape(8, 32).mean(axis=0)
     lit = lit[::-1] if lit[0] > lit[-1] else lit  # which side of the picture the roof is on is not the matter here
     x = (np.arange(32) + 0.5 - 16) / 32 * 2.0
     c = np.clip(x / (height * np.tan(angle / 2)), -1, 1)
@@ -144,7 +144,7 @@ def test_the_lights_are_those_of_the_map_that_it_replaces(session: rg.Session, t
     sets = ("sun.light=[lamp, sun]", "shadows.type=traced_shadows")
     pipeline = rg.load("deferred", scene=tmp_path / "scene.yaml", size=SIZE, sets=sets)
     frame = session.render(pipeline, outputs=(), taps=("shadows.visibility",))
-    layers = frame["shadows.visibility"]
+    layers = frame.arrays["shadows.visibility"]
     assert layers.shape[0] == 2
     assert not np.array_equal(layers[0], layers[1])
     assert "sun" in frame.culled  # no map is drawn
@@ -160,4 +160,4 @@ def test_rays_differ_from_frame_to_frame_if_animated(session: rg.Session, tmp_pa
         first, second = (
             session.render(pipeline, outputs=(), taps=("shadows.visibility",), frames=range(n, n + 1)) for n in (1, 2)
         )
-        assert np.array_equal(first["shadows.visibility"], second["shadows.visibility"]) != animated
+        assert np.array_equal(first.arrays["shadows.visibility"], second.arrays["shadows.visibility"]) != animated
