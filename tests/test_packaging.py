@@ -90,6 +90,35 @@ def test_the_wheel_draws(wheel: Path, tmp_path: Path) -> None:
     assert (here / "wheel.png").stat().st_size > 100
 
 
+@pytest.mark.nightly
+def test_the_wheel_in_a_bare_environment_runs_every_command_of_the_readme(wheel: Path, tmp_path: Path) -> None:
+    """With what `pip install` brings and nothing else, in an empty folder, at the size that readers get."""
+    bare, here = tmp_path / "bare", tmp_path / "here"
+    here.mkdir()
+    subprocess.run([sys.executable, "-m", "venv", str(bare)], check=True)
+    install = [str(bare / "bin" / "pip"), "install", "--quiet"]
+    if subprocess.run([*install, "click"], capture_output=True, check=False).returncode != 0:
+        pytest.skip("no package index")
+    subprocess.run([*install, str(wheel)], check=True)
+    environment = {"PATH": f"{bare / 'bin'}:/usr/bin:/bin", "HOME": str(tmp_path)}
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    ran = 0
+    for language, text in re.findall(r"^```(\w+)\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL):
+        if named := re.match(r"# ([\w.-]+\.\w+)\n", text):
+            (here / named[1]).write_text(text, encoding="utf-8")
+        commands = re.findall(r"^\$ (rendergraph .*)$", text, re.MULTILINE)
+        words = [["sh", "-c", command] for command in commands]
+        if language == "python":
+            words = [[str(bare / "bin" / "python"), "-I", "-c", text]]
+        for command in words:
+            done = subprocess.run(command, cwd=here, env=environment, capture_output=True, text=True, check=False)
+            assert done.returncode == 0, f"{command[-1]}\n{done.stderr}"
+            ran += 1
+    assert ran >= 9
+    made = {file.name for file in here.iterdir()}
+    assert made >= {"full.png", "other.png", "study.png", "hard.exr", "hard.png", "report.html", "forward.png"}
+
+
 def test_the_standard_nodes_come_by_the_entry_point() -> None:
     found = {entry.name: entry.value for entry in entry_points(group="rendergraph.nodes")}
     assert found["builtin"] == "rendergraph.nodes"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import wraps
@@ -317,18 +318,23 @@ class Pipeline:
             session, device, progress: as for `render`.
             options: the other fields of `RenderOptions`.
 
+        Warns:
+            UserWarning: nothing in the scene moves, nor does the camera.
+
         Raises:
             UsageError: no film has that extension, the encoder is not installed, or the length is contradictory.
         """
         from rendergraph import images
         from rendergraph.images.video import check_film, films
-        from rendergraph.session.films import film_frames
+        from rendergraph.session.films import film_frames, standstill_warning
         from rendergraph.session.gpu import opened
 
         path = check_film(Path(path))
         numbers = film_frames(self.link().scene, fps, frames, seconds, turntable=turntable)
         options = {"outputs": ["image"], **options, "turntable": numbers if turntable else None}
         expanded = self.expand(frames=numbers, fps=fps, **options)
+        for problem in standstill_warning(expanded, film=True):
+            warnings.warn(problem.text.replace("--turntable", "turntable=True"), stacklevel=2)
         with (
             films([path], fps, numbers[0]) as made,
             opened(session, device) as gpu,

@@ -122,6 +122,8 @@ def test_a_film_in_which_nothing_moves_says_so(scene: Path, capsys: pytest.Captu
     pytest.importorskip("imageio_ffmpeg")
     assert main([*words[:-4], "-o", "a.gif"]) == 0
     assert "RG629 nothing in the scene moves, so the film is one frame; --turntable" in capsys.readouterr().err
+    with pytest.warns(UserWarning, match="nothing in the scene moves, so the film is one frame; turntable=True"):
+        rg.load("forward", scene=scene, size=(16, 9)).film("b.gif")
     assert main([*words, "--turntable"]) == 0
     assert "RG629" not in capsys.readouterr().err
 
