@@ -53,6 +53,15 @@ def anchors(page: str) -> frozenset[str]:
     return frozenset(found)
 
 
+def test_each_term_of_the_glossary_leads_to_a_page_that_uses_it() -> None:
+    glossary = ROOT / "docs" / "reference" / "glossary.md"
+    rows = re.findall(r"^\| ([A-Z].*?) \| .* \| \[.*\]\((.*)\) \|$", glossary.read_text(encoding="utf-8"), re.M)
+    assert len(rows) >= 60
+    for names, page in rows:
+        text = " ".join((glossary.parent / page).read_text(encoding="utf-8").lower().split())
+        assert any(name.removesuffix("s") in text for name in names.lower().split(", ")), (names, page)
+
+
 def links(page: str) -> Iterator[tuple[int, str, str]]:
     """Line, text and target of each link and picture."""
     text = re.sub(r"(`+)[^`].*?\1", lambda found: "x" * len(found[0]), prose(page))
