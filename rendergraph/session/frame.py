@@ -120,12 +120,15 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
         return f"<Frame {self.number} of {self.pipeline}, {width}×{height}: {', '.join(self.arrays)}>"
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        if name not in self.arrays:
-            raise KeyError(f"no output '{name}'{suggestion(name, self.arrays)}; render(taps=['NODE.PORT']) adds ports")
-        array = self.arrays[name]
+        array = self._array(name)
         if array.ndim == 4 and len(array) == 1:
             array = array[0]
         return array[..., 0] if array.ndim >= 3 and array.shape[-1] == 1 else array
+
+    def _array(self, name: str) -> npt.NDArray[Any]:
+        if name not in self.arrays:
+            raise KeyError(f"no output '{name}'{suggestion(name, self.arrays)}; render(taps=['NODE.PORT']) adds ports")
+        return self.arrays[name]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.arrays)
@@ -243,7 +246,7 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
         """
         from rendergraph.images import shown
 
-        array, info = self.arrays[name], self.infos[name]
+        array, info = self._array(name), self.infos[name]
         part = {"layer": layer, "channel": channel, "low": low, "high": high}
         return shown(array, name, info.semantic, info.encoding, **part)  # type: ignore[arg-type]
 

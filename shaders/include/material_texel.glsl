@@ -1,8 +1,8 @@
 // Texel of a material's image at texture coordinates.
 //
-// Anisotropic filters read along the longer axis of a pixel's footprint. Samplers allow a ratio of 8 (`gpu_scene.py`), so
-// a footprint of 8 images or more reads the coarsest mip level, which is a single texel. That is read here at once: a
-// software rasteriser visits every repetition of the image in the footprint, thousands of them near a horizon.
+// Anisotropic filters read along the longer axis of a pixel's footprint. Samplers allow a ratio of 8 (`gpu_scene.py`),
+// so a footprint of 8 images or more reads the coarsest mip level, which is a single texel. That is read here at once:
+// a software rasteriser visits every repetition of the image in the footprint, thousands of them near a horizon.
 vec4 material_texel(sampler2D image, vec2 uv) {
     int coarsest = textureQueryLevels(image) - 1;
     vec2 size = vec2(textureSize(image, 0)), dx = dFdxCoarse(uv) * size, dy = dFdyCoarse(uv) * size;
