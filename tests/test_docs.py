@@ -89,7 +89,15 @@ def test_a_command_in_the_text_is_one(page: Path, command: str) -> None:
                 endpoint(linked.graph, tap.name)
 
 
-LONG_PAGES = {"compare.md", "laptop-to-cluster.md", "hybrid.md", "view.md", "own-data.md"}
+LONG_PAGES = {
+    "compare.md",
+    "laptop-to-cluster.md",
+    "hybrid.md",
+    "view.md",
+    "own-data.md",
+    "test-a-node.md",
+    "scenes.md",
+}
 """Pages whose commands take 5 seconds or more; README.md, the longest, stays in `make check`."""
 
 

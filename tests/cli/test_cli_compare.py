@@ -398,7 +398,7 @@ def test_variants_and_ports_that_cannot_be_are_told(cli: Any, words: list[str], 
     assert message in result.err
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_any_port_is_measured(cli: Any, gl: rg.Session, tmp_path: Path) -> None:
     size = (32, 18)
     names = ("ssao-hemisphere", "ssao-disc")

@@ -468,6 +468,7 @@ def test_the_front_is_what_nothing_beats() -> None:
     assert pareto([slow, quick, hidden]) == [quick, slow]
 
 
+@pytest.mark.nightly
 def test_each_scene_of_a_sweep_is_measured_against_its_own_reference(tmp_path: Path) -> None:
     axes = {"scene": ["cornell_box", "shadow_study"], "light.shading": ["phong", "pbr"]}
     base = rg.load("forward", size=(32, 18))

@@ -416,6 +416,7 @@ def roughness(values: Floats) -> float:
     return float((flat - basis @ np.linalg.lstsq(basis, flat, rcond=None)[0]).std(axis=0).mean() / flat.mean())
 
 
+@pytest.mark.nightly
 def test_indirect_light_in_the_courtyard_is_smooth(session: rg.Session) -> None:
     """Lanterns of a few pixels leave no blotches on the pink wall, and the filter no grid on the plinth's dark side."""
     frame = session.render(rg.load("full", size=(640, 360)), outputs=(), taps=("gi.indirect",), warm_up=False)

@@ -179,7 +179,7 @@ def test_both_at_once_are_occlusion_and_light(session: rg.Session) -> None:
     assert np.abs(found["open"][..., 0] - apart).max() < 0.02
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_filter_takes_noise_and_a_reduced_scale_is_interpolated(session: rg.Session) -> None:
     sets = ("gi.sky=0", "light.ambient=0")
     many, raw, smooth, half = (
