@@ -89,22 +89,29 @@ def test_a_command_in_the_text_is_one(page: Path, command: str) -> None:
                 endpoint(linked.graph, tap.name)
 
 
-LONG_PAGES = {
-    "compare.md",
-    "laptop-to-cluster.md",
-    "hybrid.md",
-    "view.md",
-    "own-data.md",
-    "test-a-node.md",
-    "scenes.md",
-}
-"""Pages whose commands take 5 seconds or more; README.md, the longest, stays in `make check`."""
+LONG_PAGES = frozenset(
+    [
+        "compare",
+        "compute-node",
+        "forward-prepass",
+        "gpu-data",
+        "hybrid",
+        "laptop-to-cluster",
+        "light-parts",
+        "own-data",
+        "path-traced",
+        "scenes",
+        "test-a-node",
+        "view",
+    ]
+)
+"""Pages whose commands take 3 seconds or more; README.md, the longest, and the first pages of the guide stay in `make check`."""
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "page",
-    [pytest.param(page, marks=[pytest.mark.nightly] if page.name in LONG_PAGES else []) for page in PAGES],
+    [pytest.param(page, marks=[pytest.mark.nightly] if page.stem in LONG_PAGES else []) for page in PAGES],
     ids=lambda page: str(page.relative_to(ROOT)),
 )
 def test_blocks_of_a_page(
