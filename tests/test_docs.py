@@ -89,22 +89,20 @@ def test_a_command_in_the_text_is_one(page: Path, command: str) -> None:
                 endpoint(linked.graph, tap.name)
 
 
-LONG_PAGES = frozenset(
-    [
-        "compare",
-        "compute-node",
-        "forward-prepass",
-        "gpu-data",
-        "hybrid",
-        "laptop-to-cluster",
-        "light-parts",
-        "own-data",
-        "path-traced",
-        "scenes",
-        "test-a-node",
-        "view",
-    ]
-)
+LONG_PAGES = {
+    "compare",
+    "compute-node",
+    "forward-prepass",
+    "gpu-data",
+    "hybrid",
+    "laptop-to-cluster",
+    "light-parts",
+    "own-data",
+    "path-traced",
+    "scenes",
+    "test-a-node",
+    "view",
+}
 """Pages whose commands take 3 seconds or more; README.md, the longest, and the first pages of the guide stay in `make check`."""
 
 
