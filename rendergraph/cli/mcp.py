@@ -138,7 +138,7 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
 
         def work() -> list[Any]:
             found = _pipeline(root, pipeline, settings, size).render(taps=[port])
-            shown, values = found.show(port, layer=layer, channel=channel), found.arrays[port]
+            shown, values = found.show(port, layer=layer, channel=channel), found[port]
             text = f"{shown!r}; shape {values.shape}, {values.dtype}, least {values.min():g}, greatest {values.max():g}"
             return [f"{text}, mean {values.mean():g}", Image(data=shown.png, format="png")]
 

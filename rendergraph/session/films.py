@@ -45,11 +45,11 @@ def film_frames(
     return range(1, max(1, round(seconds * fps)) + 1)
 
 
-def standstill_warning(expanded: Expanded, *, film: bool) -> list[Problem]:
-    """Return a warning about a film or several frames of a scene in which nothing moves."""
+def standstill_warning(expanded: Expanded, *, film: bool, turntable: str = "--turntable") -> list[Problem]:
+    """Return a warning about a film or several frames of a scene in which nothing moves; `turntable` is the way out."""
     linked, count = expanded.linked, len(expanded.options.frames)
     if animate.moves(linked.scene) or expanded.options.turntable or (count == 1 and not film):
         return []
     span = f" during {count} frames" if count > 1 else ", so the film is one frame"
-    text = f"nothing in the scene moves{span}; --turntable takes the camera around it"
+    text = f"nothing in the scene moves{span}; {turntable} takes the camera around it"
     return [Problem("RG629", text, Place(linked.graph.name), severity="warning")]

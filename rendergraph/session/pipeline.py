@@ -333,8 +333,8 @@ class Pipeline:
         numbers = film_frames(self.link().scene, fps, frames, seconds, turntable=turntable)
         options = {"outputs": ["image"], **options, "turntable": numbers if turntable else None}
         expanded = self.expand(frames=numbers, fps=fps, **options)
-        for problem in standstill_warning(expanded, film=True):
-            warnings.warn(problem.text.replace("--turntable", "turntable=True"), stacklevel=2)
+        for problem in standstill_warning(expanded, film=True, turntable="turntable=True"):
+            warnings.warn(problem.text, stacklevel=2)
         with (
             films([path], fps, numbers[0]) as made,
             opened(session, device) as gpu,
