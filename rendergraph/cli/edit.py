@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -138,19 +137,14 @@ def _finish(
     pipeline: PipelineText, before: str, dry_run: bool, plugins: tuple[Path, ...], as_json: bool, check: bool = True
 ) -> None:
     """Show the difference, write the file, and say what `check` says about it."""
-    from rendergraph.images.files import staged
-    from rendergraph.read import read
+    from rendergraph.images.files import replace_text
     from rendergraph.session import Selection, stages
 
     file, after = pipeline.path, pipeline.text
     old, new = (text.splitlines() for text in (before, after))
     difference = "\n".join(difflib.unified_diff(old, new, str(file), str(file), n=1, lineterm=""))
     if after != before and not dry_run:
-        with staged([file]) as (part,):
-            # A byte order mark, which is not in the text, stays as well.
-            mark = b"\xef\xbb\xbf" if file.read_bytes().startswith(b"\xef\xbb\xbf") else b""
-            part.write_bytes(mark + after.encode("utf-8"))
-            shutil.copymode(file, part)
+        replace_text(file, after)
     if difference and not as_json:
         emit(difference)
     for note in pipeline.notes:
@@ -158,8 +152,7 @@ def _finish(
     mistakes: tuple[Problem, ...] = ()
     if check:
         try:
-            document = read(file, after, keep_going=True)
-            linked = stages.link(stages.resolve(Selection(str(file), plugins=plugins), pipeline.catalog, document))
+            linked = stages.link(stages.resolve(Selection(str(file), text=after, plugins=plugins), pipeline.catalog))
             warn([*linked.warnings, *stages.check(linked).warnings])
             say(linked.graph.summary)
         except InputError as error:

@@ -102,7 +102,11 @@ def command(
         if not no_open:
             _open(server.url)
         say("serving; Ctrl-C ends")
-        server.run()
+        try:
+            server.run()
+        finally:
+            if (kept := state.keep()) is not None:
+                say(f"changes that were not saved are in {kept.name}")
 
 
 def _open(url: str) -> None:

@@ -52,12 +52,12 @@ class PipelineText(Struct, eq=False):
         self._set(("nodes", id), {"type": node_type, **{name: part for name, part in parts.items() if part}})
 
     def delete(self, id: str) -> None:
-        """Remove a node and the links to it that this file has."""
+        """Remove a node and the links to it, those that this file inherits by null."""
         self._node(id)
-        for path, link in self._links():
+        for path, link in _links(self._whole()):
             links = link if isinstance(link, list) else [link]
             left = [one for one in links if _source(one) != id]
-            if len(left) < len(links):
+            if len(left) < len(links) and path[:2] != ("nodes", id):
                 self.notes.append(f"'{path[1]}{path[3:] and '.' + str(path[3])}' no longer reads '{id}'")
                 self._set(path, left if len(left) > 1 else left[0] if left else DELETED)
         self._set(("nodes", id), DELETED)
@@ -69,7 +69,7 @@ class PipelineText(Struct, eq=False):
         if _at(self._inherited(), ("nodes", id)) is not None:
             raise _mistake("RG109", f"node '{id}' comes from the file that this one extends; rename it there")
         self.text = yaml_text.rename(self.text, ("nodes", id), new)
-        for path, link in self._links():
+        for path, link in _links(self._own()):
             for number, one in enumerate(link if isinstance(link, list) else [link]):
                 if _source(one) == id:
                     self._set((*path, number) if isinstance(link, list) else path, new + one[len(id) :])
@@ -198,14 +198,6 @@ class PipelineText(Struct, eq=False):
             path = (*path, step)
         return path
 
-    def _links(self) -> Iterator[tuple[yaml_text.Path, Any]]:
-        """Yield the links that this file has itself, with their places."""
-        own = self._own()
-        for id, node in (own.get("nodes") or {}).items():
-            for name, link in (_at(node, ("inputs",)) or {}).items():
-                yield ("nodes", id, "inputs", name), link
-        yield from ((("outputs", name), link) for name, link in (own.get("outputs") or {}).items())
-
     def _passage(self, node_type: str) -> tuple[str, str]:
         """Return an input and the output that continues it, required inputs first."""
         cls = self.catalog.get(node_type).cls if node_type in self.catalog else None
@@ -236,6 +228,14 @@ def _at(data: Any, path: Iterable[Any]) -> Any:
     for step in path:
         data = data.get(step) if isinstance(data, dict) else None
     return data
+
+
+def _links(file: Any) -> Iterator[tuple[yaml_text.Path, Any]]:
+    """Yield the links of a file, with their places."""
+    for id, node in (file.get("nodes") or {}).items():
+        for name, link in (_at(node, ("inputs",)) or {}).items():
+            yield ("nodes", id, "inputs", name), link
+    yield from ((("outputs", name), link) for name, link in (file.get("outputs") or {}).items())
 
 
 def _source(link: Any) -> str:

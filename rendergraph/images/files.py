@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -48,6 +49,14 @@ def write_file(path: Path, content: str | bytes) -> None:
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     with staged([path]) as (part,):
         part.write_bytes(data)
+
+
+def replace_text(path: Path, text: str) -> None:
+    """Write a text file anew as a whole; its mode stays, and so does a byte order mark, which is not in the text."""
+    mark = b"\xef\xbb\xbf" if path.read_bytes().startswith(b"\xef\xbb\xbf") else b""
+    with staged([path]) as (part,):
+        part.write_bytes(mark + text.encode("utf-8"))
+        shutil.copymode(path, part)
 
 
 def flush(path: Path) -> None:

@@ -35,6 +35,7 @@ class Selection(Struct, frozen=True):
 
     Attributes:
         source: a shipped name (`forward`), a path, YAML text of several lines, or a mapping with the keys of a file.
+        text: what the file `source` holds, where it has been edited and is not written yet.
         scene, size: override the file's; `size` is width and height in pixels.
         environment: an equirectangular image that replaces the scene's.
         variant: name of a variant of the scene's file, which has other materials.
@@ -64,6 +65,7 @@ class Selection(Struct, frozen=True):
     asset_roots: tuple[Path, ...] = ()
     limits: tuple[tuple[str, int], ...] = ()
     plugins: tuple[Path, ...] = ()
+    text: str | None = None
 
     def __post_init__(self) -> None:
         if self.size is not None:

@@ -26,6 +26,7 @@ import rendergraph.schedule
 from rendergraph.catalog import Catalog
 from rendergraph.document import Document, YamlLimits
 from rendergraph.errors import InputError, Option, Place, Problem, RendergraphError, UsageError
+from rendergraph.read import read
 from rendergraph.resolve import PipelineSpec
 from rendergraph.scene.animate import complete, on_turntable
 from rendergraph.scene.facts import camera_facts, environment_facts, light_facts, material_facts, object_facts
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
     from rendergraph.session.progress import Progress
 
 
-def resolve(selection: Selection, catalog: Catalog | None = None, document: Document | None = None) -> Resolved:
+def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
     """Read the file and everything it refers to, and apply the selection; of a picture, the pipeline in its metadata.
 
     Only a file that is missing, not YAML, or extends itself is an error here; `link` reports all other mistakes.
@@ -55,7 +56,6 @@ def resolve(selection: Selection, catalog: Catalog | None = None, document: Docu
     Args:
         selection: the pipeline, and the changes to it.
         catalog: the available node types; by default the installed ones and those of plugins.
-        document: the selected file where it is read already, such as one that has been edited and not been written.
     """
     for folder in selection.asset_roots:
         if not folder.is_dir():
@@ -63,7 +63,9 @@ def resolve(selection: Selection, catalog: Catalog | None = None, document: Docu
             raise InputError(Problem("RG011", text, Place(Option("--asset-root"))))
     catalog = catalog or Catalog.discover(selection.plugins)
     limits = YamlLimits(**selection.allowed("yaml"))
-    source: str | Document | Mapping[str, Any] = document or selection.source
+    source: str | Document | Mapping[str, Any] = selection.source
+    if selection.text is not None:
+        source = read(Path(str(source)), selection.text, limits, keep_going=True)
     frames, fps, subframes = range(1, 2), 30.0, 1
     if is_picture(selection.source):
         picture = read_picture_metadata(Path(str(selection.source)), limits)

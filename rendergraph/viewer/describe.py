@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence, Set
 from typing import Any
 
-from rendergraph.declare import FileContent, Input, Parameter
+from rendergraph.declare import FileContent, InOut, Input, Parameter
 from rendergraph.diagrams import graph_json, plan_json
 from rendergraph.errors import InputError
 from rendergraph.link import Graph, GraphNode
@@ -36,7 +36,7 @@ def describe(planned: Planned) -> dict[str, Any]:
             "inputs": {
                 name: _input(graph, node.id, name, port)
                 for name, port in node.node.inputs().items()
-                if isinstance(port, Input)
+                if isinstance(port, Input | InOut)
             },
         }
         for node in graph.nodes
@@ -104,13 +104,13 @@ def _kind(value: Any, annotation: Any = None) -> str:
     return next((name for kind, name in kinds if isinstance(value, kind)), "json")
 
 
-def _input(graph: Graph, node: str, name: str, port: Input) -> dict[str, Any]:
+def _input(graph: Graph, node: str, name: str, port: Input | InOut) -> dict[str, Any]:
     ends = graph[node].inputs.get(name, ())
     return {
         "doc": port.doc,
         "kind": port.kind,
-        "semantic": port.semantic.name,
+        "semantic": getattr(port.semantic, "name", "any"),
         "optional": port.optional,
-        "many": port.many,
+        "many": getattr(port, "many", False),
         "links": [str(end) for end in ends],
     }

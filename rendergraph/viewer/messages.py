@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Annotated, Any, Union
 
 from msgspec import UNSET, Meta, Struct, UnsetType, ValidationError, convert, json
@@ -53,25 +52,13 @@ class CompareRequest:
 
 
 @dataclass(frozen=True)
-class VariantRequest:
-    """A file that extends the opened pipeline by all edits, and shows the scene by the camera that was moved.
-
-    It will be written into `folder`. A state that does not link is answered with its problems.
-    """
-
-    opened: Selection
-    selection: Selection
-    folder: Path
-
-
-@dataclass(frozen=True)
 class ChangedFilesRequest:
     """The input files of the picture that have changed."""
 
     pass
 
 
-Request = RenderRequest | ThumbnailRequest | PixelRequest | CompareRequest | VariantRequest | ChangedFilesRequest
+Request = RenderRequest | ThumbnailRequest | PixelRequest | CompareRequest | ChangedFilesRequest
 
 
 @dataclass(frozen=True)
@@ -89,6 +76,7 @@ class Response:
 
 LONGEST_VALUE = 20_000
 """Characters of a value."""
+_NAME = re.compile("[A-Za-z_][A-Za-z0-9_-]*")
 
 
 class PageMessage(Struct, frozen=True, tag_field="do", tag=lambda name: name.removesuffix("Message").lower()):
@@ -103,7 +91,7 @@ class SetMessage(PageMessage, frozen=True):
     def __post_init__(self) -> None:
         if len(repr(self.value)) > LONGEST_VALUE:
             raise ValueError("the value is too long")
-        is_name = isinstance(self.value, str) and re.fullmatch(r"[A-Za-z_][A-Za-z0-9_-]*", self.value)
+        is_name = isinstance(self.value, str) and _NAME.fullmatch(self.value)
         if self.path.endswith(".type") and not is_name:  # no page may name a file
             raise ValueError("a type must be the name of a node type; write a file's path into the pipeline instead")
 
@@ -161,8 +149,60 @@ class PixelMessage(PageMessage, frozen=True):
     y: float
 
 
+class EditMessage(PageMessage, frozen=True):
+    """Operations on the graph, as `rendergraph edit` has them: together one step of undo."""
+
+    operations: Annotated[list[list[Any]], Meta(min_length=1, max_length=16)]
+
+    def __post_init__(self) -> None:
+        for name, *words in (operation or [""] for operation in self.operations):
+            kinds = OPERATIONS.get(name) if isinstance(name, str) else None
+            if kinds is None or len(words) != len(kinds) or not all(map(isinstance, words, kinds)):
+                raise ValueError(f"'{name}' is no operation with these words")
+            if len(repr(words)) > LONGEST_VALUE:
+                raise ValueError("the operation is too long")
+            if name in ("add", "retype", "insert") and not _NAME.fullmatch(words[1]):  # no page may name a file
+                raise ValueError("a type must be the name of a node type")
+
+
+OPERATIONS: Mapping[str, tuple[type, ...]] = {
+    "add": (str, str, dict),
+    "delete": (str,),
+    "rename": (str, str),
+    "connect": (str, list),
+    "disconnect": (str,),
+    "retype": (str, str),
+    "disable": (str,),
+    "enable": (str,),
+    "insert": (str, str, str),
+    "duplicate": (str, str),
+}
+"""Methods of `PipelineText` that a page may call, with the types of their words."""
+
+
+class ReloadMessage(PageMessage, frozen=True):
+    """Take the file as it is on the disk in place of the changes to it."""
+
+    pass
+
+
+class TypesMessage(PageMessage, frozen=True):
+    """Ask for the node types that can be added."""
+
+    pass
+
+
+class DraftMessage(PageMessage, frozen=True):
+    """Ask what saving would write, under a name or to the edited file."""
+
+    name: Any = None
+
+
 class SaveMessage(PageMessage, frozen=True):
+    """Save under a name; of the opened file itself, what its `digest` was in the draft that was shown."""
+
     name: Any
+    digest: str = ""
 
 
 _MESSAGES: Any = Union[tuple(PageMessage.__subclasses__())]  # noqa: UP007  # a tuple of types

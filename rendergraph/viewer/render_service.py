@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import singledispatchmethod
@@ -16,12 +15,8 @@ from msgspec.structs import replace
 
 from rendergraph import images, stamps
 from rendergraph.compile import Executable
-from rendergraph.document import Source, from_plain
 from rendergraph.errors import Place, Problem, RendergraphError, shown_file
 from rendergraph.metrics import measure
-from rendergraph.resolve import diff, to_yaml
-from rendergraph.resources import shipped_scenes
-from rendergraph.scene.camera_words import keys_of
 from rendergraph.scene.cameras import bounding_sphere
 from rendergraph.session import stages
 from rendergraph.session.drawing import Drawing
@@ -275,17 +270,6 @@ class RenderService:
             files["flip"] = self._encode(images.heat_map(flip), ".png")
         return Response(facts, files)
 
-    @_answer.register
-    def _variant(self, request: messages.VariantRequest) -> Response:
-        opened = replace(request.opened, sets=(), patches=(), scene=None, size=None)
-        self._link(request.selection)  # what does not link is not saved
-        linked = self._link(replace(request.selection, camera=None))  # with the scene's own cameras
-        before, after = stages.resolve(opened).spec.plain(), linked.spec.plain()
-        variant = {"extends": opened.source} | diff(before, after)
-        if seen := _view_keys(request, linked):
-            variant["scene"] = _scene_keys(linked, request.folder) | seen
-        return Response({"yaml": to_yaml(from_plain(variant, Source("variant")), origins=False)})
-
     # --- encoding, and errors ----------------------------------------------------------------------------------------
 
     def _encode(self, picture: npt.NDArray[np.uint8], ending: str) -> bytes:
@@ -307,29 +291,6 @@ class RenderService:
             (n.place.line, n.id) for n in nodes if n.place and n.place.file == place.file and n.place.line <= place.line
         ]
         return max(above)[1] if above else None
-
-
-def _view_keys(request: messages.VariantRequest, linked: Linked) -> dict[str, Any]:
-    """Return what a scene file says of a camera that was moved, and of the surroundings of the command line."""
-    keys: dict[str, Any] = {}
-    chosen = request.selection
-    if chosen.camera is not None and "=" in chosen.camera:
-        values = {key: list(v) if isinstance(v, tuple) else v for key, v in keys_of(chosen.camera).items()}
-        keys["cameras"] = {next(iter(linked.scene.cameras), "main"): values}
-    if chosen.environment is not None:
-        keys["environment"] = None if str(chosen.environment) == "none" else {"file": str(chosen.environment)}
-    if chosen.ground:
-        keys["environment"] = (keys.get("environment") or {}) | {"ground": True}
-    return keys | ({"variant": chosen.variant} if chosen.variant else {})
-
-
-def _scene_keys(linked: Linked, folder: Path) -> dict[str, Any]:
-    """Return the scene of a pipeline as a mapping that a file in a folder may hold."""
-    file, changes = linked.spec.scene, linked.spec.scene_changes
-    keys = dict(changes.plain()) if changes is not None else {}
-    if file is not None:
-        keys["extends"] = file.stem if file in shipped_scenes().values() else os.path.relpath(file, folder)
-    return keys
 
 
 def _nodes_by_file(planned: Planned) -> dict[str, str]:

@@ -18,7 +18,6 @@ import time
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -32,10 +31,11 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from rendergraph.errors import Place, Problem, RendergraphError, UsageError
+from rendergraph.catalog import Catalog
+from rendergraph.errors import Problem, RendergraphError, UsageError
 from rendergraph.formatting import jsonable
 from rendergraph.resources import folder
-from rendergraph.viewer import messages
+from rendergraph.viewer import editing, messages
 from rendergraph.viewer.messages import PageMessage, RenderRequest, Request, Response, parse_message
 from rendergraph.viewer.render_process import RenderProcess
 from rendergraph.viewer.view_state import ViewState
@@ -127,6 +127,7 @@ class Server:
         self._details_of: RenderRequest | None = None  # a still picture whose comparison and thumbnails are missing
         self._has_problems = False  # the last picture failed, and pages know
         self._thumbnails_of: RenderRequest | None = None
+        self._judging: asyncio.Task[None] | None = None
         self._last: dict[str, bytes | str] = {}  # by kind, for pages that come later
         self._queries: dict[tuple[Page, type], tuple[Request, Callable[[Response], None]]] = {}
         self._socket = _bind(host, port)
@@ -232,17 +233,50 @@ class Server:
             case messages.PixelMessage():
                 request = messages.PixelRequest(_clamp(message.x), _clamp(message.y))
                 self._query(page, request, lambda found: page.put("pixel", _text("pixel", dict(found.facts))))
-            case messages.SaveMessage():
-                path = self._state.variant_file(message.name)
-                variant = messages.VariantRequest(self._state.opened, self._state.selection, self._state.folder)
-                self._query(page, variant, lambda found: page.put("saved", _save(path, found)))
+            case messages.DraftMessage(name):
+                text, difference, digest = self._state.draft(name)
+                page.put("draft", _text("draft", {"name": name, "difference": difference, "digest": digest}))
+            case messages.SaveMessage(name, digest):
+                text = self._state.save(name, digest)
+                page.put("saved", _text("saved", {"path": name, "yaml": text}))
+                self._changed()
+            case messages.TypesMessage():
+                catalog = Catalog.discover(self._state.opened.plugins)
+                page.put("types", _text("types", {"types": editing.node_types(catalog)}))
+            case messages.EditMessage(operations):
+                page.put("notes", _text("notes", {"notes": self._state.edit(operations)}))
+                self._changed()
             case _:
                 if isinstance(message, messages.HoldMessage):
                     page.holds = message.on
+                before = self._state.edits
                 if self._state.apply(message):
                     self._request_picture()
-                if _text("state", state := self._state.as_json()) != self._last.get("state"):
-                    self._broadcast("state", state)
+                self._send_state()
+                if self._state.edits is not before and not self._state.held:
+                    self._judge_soon()
+
+    def _changed(self) -> None:
+        self._request_picture()
+        self._send_state()
+        self._judge_soon()
+
+    def _send_state(self) -> None:
+        if _text("state", state := self._state.as_json()) != self._last.get("state"):
+            self._broadcast("state", state)
+
+    def _judge_soon(self) -> None:
+        """Say what is wrong with an edit at once, also while a picture is being drawn."""
+        if self._judging is None or self._judging.done():
+            self._judging = asyncio.create_task(self._judge())
+
+    async def _judge(self) -> None:
+        judged = None
+        while judged != (selection := self._state.selection):
+            judged = selection
+            problems = await asyncio.to_thread(editing.problems_of, selection)
+        if problems:
+            self._show_problems(problems)
 
     def _query(self, page: Page, request: Request, then: Callable[[Response], None]) -> None:
         """Ask for something beside pictures; of one page and kind only the last request counts."""
@@ -272,6 +306,7 @@ class Server:
                 if self._pages and await self._files_changed():
                     self._thumbnails_of = None
                     self._request_picture()
+                self._send_state()  # the edited file may have changed on the disk
                 continue
             self._wake.clear()
             while self._queries:
@@ -290,7 +325,7 @@ class Server:
         response = await self._ask(request)
         if response is None or response.problems:
             return
-        self._show(response, request.frame)
+        self._show(response, request)
         if self._state.playing:
             await asyncio.sleep(max(0.0, 1.0 / self._state.fps - (time.monotonic() - begun)))
             if self._state.playing and self._state.frame == request.frame:  # neither stopped nor moved meanwhile
@@ -299,14 +334,14 @@ class Server:
         elif request.still:
             self._details_of = request
 
-    def _show(self, response: Response, frame: int) -> None:
+    def _show(self, response: Response, request: RenderRequest) -> None:
         self._state.record(response)
         facts = dict(response.facts)
         if (pipeline := facts.pop("pipeline", None)) is not None:
             self._broadcast("pipeline", pipeline | {"revision": self._state.revision})
-        if self._has_problems:
+        if self._has_problems and request.selection == self._state.selection:  # or they are of a newer edit
             self._show_problems([])
-        self._broadcast("picture", facts | {"frame": frame}, response.files)
+        self._broadcast("picture", facts | {"frame": request.frame}, response.files)
 
     async def _render_details(self, request: RenderRequest) -> None:
         """Show the comparison and thumbnails of a still picture; a new request of a page comes first."""
@@ -332,7 +367,8 @@ class Server:
 
     def _show_problems(self, problems: Sequence[Mapping[str, Any]]) -> None:
         self._has_problems = bool(problems)
-        self._broadcast("problems", {"problems": list(problems)})
+        if _text("problems", facts := {"problems": list(problems)}) != self._last.get("problems"):
+            self._broadcast("problems", facts)
 
     async def _files_changed(self) -> bool:
         response = await self._ask(messages.ChangedFilesRequest()) if self._process.pid is not None else None
@@ -345,7 +381,8 @@ class Server:
         except RendergraphError as error:
             self._show_problems(_problems(error))
             return None
-        if response.problems:
+        is_past = isinstance(request, RenderRequest) and request.selection != self._state.selection
+        if response.problems and not is_past:
             self._show_problems(response.problems)
         return response
 
@@ -417,18 +454,6 @@ def _clamp(value: float) -> float:
 
 def _problems(error: RendergraphError) -> list[dict[str, Any]]:
     return [problem.as_json() | {"node": None} for problem in error.problems]
-
-
-def _save(path: Path, response: Response) -> str:
-    if response.problems or "yaml" not in response.facts:
-        return _text("saved", {"problems": list(response.problems)})
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(response.facts["yaml"])
-    except OSError as error:
-        problem = Problem("RG504", f"cannot be written: {error.strerror or error}", Place(path.name))
-        return _text("saved", {"problems": [problem.as_json()]})
-    return _text("saved", {"path": path.name, "yaml": response.facts["yaml"], "problems": []})
 
 
 def _text(kind: str, facts: Mapping[str, Any]) -> str:

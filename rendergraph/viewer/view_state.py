@@ -6,22 +6,27 @@ None of them waits for anything.
 
 from __future__ import annotations
 
+import hashlib
+import itertools
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from msgspec import UNSET, structs
 
-from rendergraph.errors import Problem, UsageError
+from rendergraph.catalog import Catalog
+from rendergraph.edit import PipelineText
+from rendergraph.errors import Place, Problem, RendergraphError, UsageError, shown_file
+from rendergraph.images.files import replace_text
 from rendergraph.resources import shipped_pipelines
 from rendergraph.scene.camera_words import camera_words, described_camera
 from rendergraph.scene.model import Camera
 from rendergraph.session.selection import Selection
 from rendergraph.viewer import camera as cameras
-from rendergraph.viewer import messages
+from rendergraph.viewer import editing, messages
 from rendergraph.viewer.messages import RenderRequest, Response
 
 MOST_UNDO = 500
@@ -34,17 +39,30 @@ _BARE = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")  # a word that needs no quotes 
 _KEYWORDS = frozenset({"null", "true", "false", "Null", "NULL", "True", "TRUE", "False", "FALSE"})
 
 
+_State = tuple[str | None, Mapping[str, str]]
+
+
 @dataclass(frozen=True)
 class Edits:
-    """Settings by path (`ao.radius`, `shadows.type`, `light.occlusion`, `camera`) in order, with undo and redo."""
+    """What was changed, with undo and redo.
+
+    Attributes:
+        current: settings by path (`ao.radius`, `shadows.type`, `light.occlusion`, `camera`), in order.
+        text: the file after changes of its graph; None is the file on the disk.
+    """
 
     current: Mapping[str, str] = field(default_factory=dict)
-    before: tuple[Mapping[str, str], ...] = ()
-    after: tuple[Mapping[str, str], ...] = ()
+    text: str | None = None
+    before: tuple[_State, ...] = ()
+    after: tuple[_State, ...] = ()
 
     @property
     def sets(self) -> tuple[str, ...]:
         return tuple(f"{path}={value}" for path, value in self.current.items())
+
+    @property
+    def state(self) -> _State:
+        return self.text, self.current
 
     def set(self, path: str, value: Any, *, again: bool = False) -> Edits:
         """Set a value; `again` continues the last change (a slider that is still held) instead of adding one."""
@@ -55,23 +73,36 @@ class Edits:
         current = {**self.current, path: text}
         if again and self.before and path in self.current:
             return replace(self, current=current, after=())
-        return self._add(current)
+        return self.write(self.text, current)
 
     def drop(self, path: str) -> Edits:
-        return self._add({p: v for p, v in self.current.items() if p != path}) if path in self.current else self
+        left = {p: v for p, v in self.current.items() if p != path}
+        return self.write(self.text, left) if path in self.current else self
+
+    def write(self, text: str | None, current: Mapping[str, str]) -> Edits:
+        """Change the text, and the settings beside it."""
+        return Edits(current, text, (*self.before, self.state)[-MOST_UNDO:])
 
     def undo(self) -> Edits:
         if not self.before:
             return self
-        return Edits(self.before[-1], self.before[:-1], (*self.after, self.current))
+        text, current = self.before[-1]
+        return Edits(current, text, self.before[:-1], (*self.after, self.state))
 
     def redo(self) -> Edits:
         if not self.after:
             return self
-        return Edits(self.after[-1], (*self.before, self.current), self.after[:-1])
+        text, current = self.after[-1]
+        return Edits(current, text, (*self.before, self.state), self.after[:-1])
 
-    def _add(self, current: Mapping[str, str]) -> Edits:
-        return Edits(current, (*self.before, self.current)[-MOST_UNDO:])
+    def save(self, before: str, after: str, current: Mapping[str, str]) -> Edits:
+        """Take note that the file was written: states that were changes to it are changes to what it was."""
+
+        def kept(states: tuple[_State, ...]) -> tuple[_State, ...]:
+            return tuple((before if text is None else text, settings) for text, settings in states)
+
+        here = (before if self.text is None else self.text, self.current)
+        return Edits(current, after, (*kept(self.before), here)[-MOST_UNDO:])
 
 
 @dataclass
@@ -103,6 +134,10 @@ class ViewState:
         self._others: dict[str, Selection] = {"as opened": self.opened}
         self._other: str | None = None
         self._snapshots = 0
+        self._own = editing.own_file(self.opened)
+        self._disk = ""  # the opened file, as the changes to its text began or as it was written
+        self._saved = self.edits.state
+        self._written: set[Path] = set()  # files that were saved from here
         if self.against is not None:
             self._others[self.against[0]] = self.against[1]
             self._other = self.against[0]
@@ -110,7 +145,23 @@ class ViewState:
     @property
     def selection(self) -> Selection:
         """The pipeline with all edits, among them a camera that was moved."""
-        return structs.replace(self.opened, sets=(*self.opened.sets, *self.edits.sets))
+        if self.edits.text is None:
+            return structs.replace(self.opened, sets=(*self.opened.sets, *self.edits.sets))
+        return structs.replace(self.opened, source=shown_file(self.file), text=self.edits.text, sets=self.edits.sets)
+
+    @property
+    def file(self) -> Path:
+        """The file that is being edited: the opened one, or a new one in the folder."""
+        return self._own or self.folder / "variant.yaml"
+
+    @property
+    def is_changed(self) -> bool:
+        return self.edits.state != self._saved
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether the opened file has changed on the disk since the changes to its text began."""
+        return self.edits.text is not None and self._own is not None and self._disk != _read(self._own)
 
     @property
     def moved_camera(self) -> Camera | None:
@@ -139,7 +190,12 @@ class ViewState:
     def as_json(self) -> dict[str, Any]:
         return {
             "edits": dict(self.edits.current),
-            "flags": list(self.edits.sets),
+            "flags": list(self.edits.sets) if self.edits.text is None else [],
+            "file": self.file.name,
+            "is_own": self._own is not None,
+            "is_changed": self.is_changed,
+            "is_rewired": self.edits.text is not None,
+            "is_behind": self.is_behind,
             "can_undo": bool(self.edits.before),
             "can_redo": bool(self.edits.after),
             "frame": self.frame,
@@ -160,14 +216,78 @@ class ViewState:
             self._sphere = response.sphere
         self.revision = int(response.facts.get("revision", self.revision))
 
-    def variant_file(self, name: object) -> Path:
+    # --- the file ----------------------------------------------------------------------------------------------------
+
+    def edit(self, operations: Sequence[Sequence[Any]]) -> list[str]:
+        """Do operations on the graph, and return what they took along, in words; a mistake changes nothing."""
+        text, sets = self.edits.text, self.edits.current
+        if text is None:
+            text = self._disk = editing.text_of(self.opened)
+            given = (setting.partition("=") for setting in self.opened.sets)
+            sets = {**{path: value for path, _, value in given}, **sets}
+        pipeline = PipelineText(text, self.file, Catalog.discover(self.opened.plugins), [])
+        camera = {CAMERA: sets[CAMERA]} if CAMERA in sets else {}
+        others = [f"{path}={value}" for path, value in sets.items() if path not in camera]
+        beside = editing.edited(pipeline, others, operations)
+        self.edits = self.edits.write(pipeline.text, beside | camera)
+        return pipeline.notes
+
+    def draft(self, name: object) -> tuple[str, str, str]:
+        """Return what `save` would write under a name, the difference, and the digest of what is there."""
+        path = self.file if name is None else self._path(name)
+        before = _read(path) if path == self._own or path in self._written else ""
+        if path == self._own:
+            text = editing.in_place(self.opened, self.selection, path, self.edits.text or before)
+        else:
+            text = editing.variant(self.opened, self.selection, path)
+        return text, editing.difference(before, text, path.name), _digest(before)
+
+    def save(self, name: object, digest: str) -> str:
+        """Write the file and return its text; of the opened one, `digest` says what it replaces.
+
+        Raises:
+            InputError: the pipeline does not link.
+            UsageError: (RG500) the name is no plain one; (RG531) the file exists, or has changed.
+        """
+        path = self._path(name)
+        text, _, found = self.draft(name)
+        if path != self._own and path not in self._written:
+            write_new(path, text)
+            self._written.add(path)
+        elif digest != found:
+            raise UsageError(Problem("RG531", f"'{path.name}' has changed on the disk; look at the difference first"))
+        else:
+            before = _read(path)
+            replace_text(path, text)
+            if path == self._own:
+                self._disk, self.edits = text, self.edits.save(before, text, {})
+        self._saved = self.edits.state
+        return text
+
+    def keep(self) -> Path | None:
+        """Write changes that were not saved into a file of their own, and return it; None if there are none."""
+        if not self.is_changed:
+            return None
+        stem = Path(self.opened.label).stem
+        names = (f"{stem}-unsaved{number or ''}.yaml" for number in itertools.count())
+        path = next(path for path in map(self.folder.joinpath, names) if not path.exists())
+        try:
+            text = editing.variant(self.opened, self.selection, path)
+        except RendergraphError:
+            text = editing.unlinked(self.opened, self.selection)
+        write_new(path, text)
+        return path
+
+    def _path(self, name: object) -> Path:
+        if self._own is not None and name == self._own.name:
+            return self._own
         if not isinstance(name, str) or not _FILE.fullmatch(name):
             text = (
                 "variants are saved in the folder where `view` was started; expected a plain name, as in variant.yaml"
             )
             raise UsageError(Problem("RG500", text))
         path = self.folder / name
-        if path.exists() or path.is_symlink():
+        if path not in self._written and (path.exists() or path.is_symlink()):
             raise UsageError(Problem("RG531", f"'{name}' exists; choose another name"))
         return path
 
@@ -184,6 +304,9 @@ class ViewState:
                 self.edits = self.edits.undo()
             case messages.RedoMessage():
                 self.edits = self.edits.redo()
+            case messages.ReloadMessage():
+                self.edits = self.edits.write(None, {p: v for p, v in self.edits.current.items() if p == CAMERA})
+                self._saved = None, {}
             case messages.CameraMessage():
                 self._move(message)
             case messages.LookMessage(port, exposure):
@@ -237,3 +360,22 @@ class ViewState:
             del self._others[list(self._others)[1]]  # the first is the file as it was opened
         self._others[name] = selection
         self._other = name
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text("utf-8-sig", "replace")
+    except OSError:  # it is gone: saving makes it again
+        return ""
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def write_new(path: Path, text: str) -> None:
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        raise UsageError(Problem("RG504", f"cannot be written: {error.strerror or error}", Place(path.name))) from None

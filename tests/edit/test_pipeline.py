@@ -145,7 +145,7 @@ def test_a_node_is_put_into_a_link_and_duplicated() -> None:
 
 def test_what_a_file_inherits_is_overridden() -> None:
     after = edited(VARIANT, "delete", "shadows")
-    assert after == VARIANT + "  shadows: null\n"
+    assert after == VARIANT.replace("ambient: 0.2}}", "ambient: 0.2}, inputs: {lookup: null}}") + "  shadows: null\n"
     assert "shadows" not in resolved(after)["nodes"]
     assert edited(VARIANT, "disconnect", "light.lookup") == VARIANT.replace(
         "ambient: 0.2}}", "ambient: 0.2}, inputs: {lookup: null}}"

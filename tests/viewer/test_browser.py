@@ -137,6 +137,7 @@ def test_a_slider_changes_the_picture_and_undo_takes_all_of_its_way_back(page: H
     assert page.page.is_disabled("#undo")
 
 
+@pytest.mark.nightly
 def test_another_button_on_a_slider_holds_nothing(page: Hand) -> None:
     page.choose("display")
     page.page.hover("[aria-label='display.exposure, slider']")
@@ -147,6 +148,7 @@ def test_another_button_on_a_slider_holds_nothing(page: Hand) -> None:
     page.page.wait_for_selector("[id='p-light.ambient']", timeout=10_000)
 
 
+@pytest.mark.nightly
 def test_what_a_hand_reaches_for_stays_where_nothing_of_it_changes(page: Hand) -> None:
     """Pictures come whenever they are ready; an input made anew for each would be gone while it is clicked."""
     page.choose("display")
@@ -157,6 +159,7 @@ def test_what_a_hand_reaches_for_stays_where_nothing_of_it_changes(page: Hand) -
     assert field.evaluate("(element) => element.mine") is True
 
 
+@pytest.mark.nightly
 def test_a_slider_is_moved_by_keys_step_after_step(page: Hand) -> None:
     page.choose("display")
     slider = page.page.locator("[aria-label='display.exposure, slider']")
@@ -167,6 +170,7 @@ def test_a_slider_is_moved_by_keys_step_after_step(page: Hand) -> None:
         assert float(page.page.input_value("[id='p-display.exposure']")) == pytest.approx(count * step)
 
 
+@pytest.mark.nightly
 def test_a_row_is_marked_while_the_hand_is_in_the_next(page: Hand) -> None:
     page.choose("display")
     page.page.fill("[id='p-display.exposure']", "1")
@@ -176,6 +180,7 @@ def test_a_row_is_marked_while_the_hand_is_in_the_next(page: Hand) -> None:
     assert page.page.evaluate("document.activeElement.id") == "p-display.white"
 
 
+@pytest.mark.nightly
 def test_what_was_chosen_stands_until_its_picture_comes_and_undo_is_seen_where_it_was_written(page: Hand) -> None:
     page.choose("display")
     # Everything that the list shows from the choice to its picture.
@@ -196,6 +201,7 @@ def test_what_was_chosen_stands_until_its_picture_comes_and_undo_is_seen_where_i
     assert field.input_value() == "3"
 
 
+@pytest.mark.nightly
 def test_the_way_of_a_colour_is_one_step_and_its_numbers_follow(page: Hand) -> None:
     page.choose("light")
     wheel = page.page.locator("[id='p-light.ambient']")
@@ -218,6 +224,7 @@ def mean(hand: Hand) -> float:
     return float(found[1])
 
 
+@pytest.mark.nightly
 def test_a_port_has_the_values_that_python_reads(page: Hand, gl: rg.Session) -> None:
     page.after(lambda: page.page.click("[aria-label='Show light.radiance']"))
     expected = gl.render(rg.load("forward", size=SIZE), outputs=(), taps=("light.radiance",))["light.radiance"]
@@ -243,7 +250,10 @@ def test_a_type_is_swapped_saved_as_a_file_and_that_is_the_same_picture(
     page.page.fill("#file", "soft.yaml")
     page.page.click("dialog button[value=save]")
     page.page.wait_for_selector("#link:has-text('saved soft.yaml')")
+    (served.folder / "there.yaml").write_text("extends: forward\n")
     page.page.click("#save")
+    page.page.fill("#file", "there.yaml")
+    page.page.wait_for_selector("#draft:has-text('exists')")
     page.page.click("dialog button[value=save]")
     page.page.wait_for_selector("#problems:has-text('RG531')")
     page.page.click("#save")
@@ -258,6 +268,7 @@ def test_a_type_is_swapped_saved_as_a_file_and_that_is_the_same_picture(
     assert not (served.folder / "other.yaml").exists()
 
 
+@pytest.mark.nightly
 def test_an_input_that_takes_many_takes_another_and_lets_go_of_one(show: Callable[..., Hand], tmp_path: Path) -> None:
     (tmp_path / "two.yaml").write_text(
         "extends: forward\nsize: [32, 24]\nnodes:\n  other: {type: shadow_pcf, inputs: {shadow_map: sun.shadow_map}}\n"
@@ -270,6 +281,7 @@ def test_an_input_that_takes_many_takes_another_and_lets_go_of_one(show: Callabl
     assert hand.page.input_value("[id='p-light.lookup']") == "other.lookup"
 
 
+@pytest.mark.nightly
 def test_a_broken_shader_is_said_on_its_node_and_mended(
     hand: Hand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -324,11 +336,13 @@ def test_the_keyboard_alone_is_enough(page: Hand) -> None:
     page.after(lambda: page.page.keyboard.press("Control+z"))
 
 
+@pytest.mark.nightly
 def test_a_window_that_becomes_small_holds_the_page(page: Hand) -> None:
     page.page.set_viewport_size({"width": 420, "height": 700})
     page.until("document.documentElement.scrollWidth <= 420")
 
 
+@pytest.mark.nightly
 def test_two_tabs_are_one_view(page: Hand) -> None:
     other = Hand(page.page.context.new_page())
     other.open(page.page.url)
@@ -365,6 +379,7 @@ def test_it_is_compared_under_a_slider(page: Hand) -> None:
     page.page.wait_for_selector("#picture:visible")
 
 
+@pytest.mark.nightly
 def test_it_comes_back_after_a_lost_render_process(page: Hand, served: Any) -> None:
     os.kill(served.process.pid, signal.SIGKILL)
     page.page.wait_for_selector("#problems:has-text('RG630')")
@@ -394,6 +409,7 @@ def test_an_exported_page_is_whole_and_offline(hand: Hand, tmp_path: Path, gl: r
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.nightly
 def test_text_can_be_read_in_both_schemes(tab: Any, served: Any, scheme: str) -> None:
     tab.emulate_media(color_scheme=scheme)
     tab.goto(served.url)
@@ -405,6 +421,7 @@ def test_text_can_be_read_in_both_schemes(tab: Any, served: Any, scheme: str) ->
     assert abs(sum(ink[:3]) - sum(ground[:3])) > 450
 
 
+@pytest.mark.nightly
 def test_what_fits_an_input_is_offered_and_what_waits_for_the_node_is_not(show: Callable[..., Hand]) -> None:
     hand = show("deferred")
     hand.choose("shadows")
@@ -429,3 +446,142 @@ def test_many_nodes_are_drawn(show: Callable[..., Hand], tmp_path: Path, count: 
     hand = show(tmp_path / "many.yaml", None)
     assert hand.page.locator("#graph .card").count() == count + 1
     hand.after(lambda: hand.page.focus("#stage") or hand.page.keyboard.press("ArrowLeft"))
+
+
+def drag(hand: Hand, start: str, end: tuple[float, float] | str) -> None:
+    """Drag the end of a link from a pin to the middle of an element, or to a point of the page."""
+    hand.page.click("#zoom-fit")
+    box = hand.page.locator(start).bounding_box()
+    to = hand.page.locator(end).bounding_box() if isinstance(end, str) else None
+    x, y = (to["x"] + to["width"] / 2, to["y"] + to["height"] / 2) if to else end
+    hand.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    hand.page.mouse.down()
+    hand.page.mouse.move(x, y, steps=3)
+    hand.page.mouse.up()
+
+
+def pick(hand: Hand, words: str) -> None:
+    """Choose the first of what the open list offers for these words."""
+    hand.page.wait_for_selector("#palette .choice")
+    hand.page.fill("#palette-search", words)
+    hand.after(lambda: hand.page.keyboard.press("Enter"))
+
+
+def choose_link(hand: Hand, words: str) -> None:
+    x, y = hand.page.evaluate(
+        """(words) => { const line = document.querySelector(`[data-link="${words}"]`);
+        const point = line.getPointAtLength(line.getTotalLength() / 2).matrixTransform(line.getScreenCTM());
+        return [point.x, point.y]; }""",
+        words,
+    )
+    hand.page.mouse.click(x, y)
+
+
+def test_the_graph_is_changed_by_hand_saved_in_place_and_undone_to_the_beginning(
+    show: Callable[..., Hand], tmp_path: Path, gl: rg.Session
+) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("rendergraph: 1\n# Mine.\nextends: forward\nsize: [64, 36]  # small\n")
+    hand = show(file, None)
+    before = mean(hand)
+    choose_link(hand, "light.radiance → display.radiance")
+    hand.page.click("#insert")
+    pick(hand, "bloom")
+    hand.page.wait_for_selector(".card.chosen[data-node=bloom]")
+    assert hand.page.input_value("#node") == "bloom"
+    hand.page.click("#duplicate")
+    hand.page.wait_for_selector(".card.idle[data-node=bloom_2]")
+    drag(hand, "[data-end='bloom_2.radiance'].output", "[data-node=display] .head")
+    hand.page.wait_for_selector("[data-link='bloom_2.radiance → display.radiance']", state="attached")
+    drag(hand, "[data-end='display.color'].output", (1200, 950))
+    pick(hand, "fxaa")
+    hand.page.wait_for_selector(".card.idle[data-node=fxaa]")
+    hand.page.click("#rename")
+    hand.page.fill("#new-name", "smooth")
+    hand.page.keyboard.press("Enter")
+    hand.page.wait_for_selector(".card.chosen[data-node=smooth]")
+    hand.choose("bloom")
+    hand.after(lambda: hand.page.click("#delete"))
+    hand.page.wait_for_selector("[data-node=bloom]", state="detached")
+    hand.page.click("#save")
+    hand.page.wait_for_selector("#draft:has-text('+  bloom_2:')")
+    assert hand.page.input_value("#file") == "mine.yaml"
+    hand.page.click("dialog button[value=save]")
+    hand.page.wait_for_selector("#link:has-text('saved mine.yaml')")
+    text = file.read_text()
+    assert text.startswith("rendergraph: 1\n# Mine.\nextends: forward\nsize: [64, 36]  # small\nnodes:\n")
+    assert "smooth: {type: fxaa, inputs: {source: display.color}}" in text
+    shown = gl.render(rg.load(file), outputs=("image",))["image"]
+    assert mean(hand) == pytest.approx(shown[..., 0].mean(), rel=1e-3)
+    while hand.page.is_enabled("#undo"):
+        hand.page.click("#undo")
+        hand.page.wait_for_timeout(50)
+    hand.page.wait_for_selector("[data-node=bloom_2]", state="detached")
+    hand.until(f"document.querySelectorAll('#canvas .card').length === {len(rg.load('forward').link().graph.nodes)}")
+    assert mean(hand) == before
+
+
+@pytest.mark.nightly
+def test_what_does_not_fit_stands_back_and_a_mistake_is_said_at_its_node(show: Callable[..., Hand]) -> None:
+    hand = show()
+    hand.page.click("#zoom-fit")
+    box = hand.page.locator("[data-end='light.radiance'].output").bounding_box()
+    hand.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    hand.page.mouse.down()
+    hand.page.mouse.move(box["x"] + 20, box["y"] + 20)
+    apart = "[...document.querySelectorAll('.card.apart')].map((card) => card.dataset.node)"
+    assert "display" not in hand.page.evaluate(apart)
+    assert {"sun", "shadows", "light"} <= set(hand.page.evaluate(apart))
+    hand.page.mouse.up()
+    hand.page.wait_for_selector("#palette .choice")
+    hand.page.keyboard.press("Escape")
+    hand.choose("light")
+    hand.page.click("#delete")  # nothing else makes radiance
+    hand.page.wait_for_selector("#problems:has-text('display')")
+    hand.page.wait_for_selector(".card[data-node=light]")
+    hand.after(lambda: hand.page.click("#undo"))
+    hand.page.wait_for_selector("#problems", state="hidden")
+
+
+@pytest.mark.nightly
+def test_a_change_on_the_disk_is_said_beside_the_changes_of_the_page(show: Callable[..., Hand], tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("rendergraph: 1\nextends: forward\nsize: [64, 36]\n")
+    hand = show(file, None)
+    hand.page.click("#add")
+    pick(hand, "bloom")
+    hand.page.wait_for_selector("[data-node=bloom]")
+    file.write_text("rendergraph: 1\nextends: forward\nsize: [32, 18]\n")
+    hand.page.wait_for_selector("#problems:has-text('has changed on the disk')")
+    hand.page.click("#save")
+    hand.page.wait_for_selector("#draft:has-text('-size: [32, 18]')")
+    hand.page.keyboard.press("Escape")
+    hand.after(lambda: hand.page.click("#problems button"))
+    hand.page.wait_for_selector("#figures:has-text('32×18')")
+    hand.page.wait_for_selector("[data-node=bloom]", state="detached")
+
+
+@pytest.mark.nightly(keep=1)
+@pytest.mark.parametrize("tab_name", ["graph", "memory", "times", "changes"])
+def test_axe_finds_nothing(page: Hand, tab_name: str) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    page.choose("light")
+    page.after(lambda: page.page.fill("[id='p-light.ambient']", "0.1") or page.page.keyboard.press("Enter"))
+    page.page.click(f"#tab-{tab_name}")
+    found = axe.Axe().run(page.page).response["violations"]
+    assert [(each["id"], [node["target"] for node in each["nodes"]][:3]) for each in found] == []
+
+
+@pytest.mark.nightly
+def test_axe_finds_nothing_in_the_dialogs(page: Hand) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    page.page.click("#add")
+    page.page.wait_for_selector("#palette .choice")
+    found = axe.Axe().run(page.page).response["violations"]
+    page.page.keyboard.press("Escape")
+    page.choose("light")
+    page.after(lambda: page.page.click("#duplicate"))
+    page.page.click("#save")
+    page.page.wait_for_selector("#draft:has-text('light_2')")
+    found += axe.Axe().run(page.page).response["violations"]
+    assert [(each["id"], [node["target"] for node in each["nodes"]][:3]) for each in found] == []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,11 +18,8 @@ from rendergraph.viewer.messages import (
     RenderRequest,
     Response,
     ThumbnailRequest,
-    VariantRequest,
-    parse_message,
 )
 from rendergraph.viewer.render_service import RenderService, texel, texture_statistics
-from rendergraph.viewer.view_state import ViewState
 
 SIZE = (64, 36)
 FORWARD = rg.Selection("forward", size=SIZE)
@@ -158,53 +154,6 @@ def test_types_that_fit_the_links_come_before_those_that_want_others(service: Re
     for name in sun["types"]:
         rg.load("forward", size=SIZE, sets=[f"sun.type={name}"]).expand()
     assert not set(sun["types"]) & set(sun["other_types"])
-
-
-@pytest.mark.slow
-def test_a_variant_reads_back_to_what_was_on_the_page(service: RenderService, tmp_path: Path) -> None:
-    changed = replace(FORWARD, sets=("display.exposure=1.5", "shadows.type=shadow_vsm", "light.smith=fast"))
-    text = service.answer(VariantRequest(FORWARD, changed, tmp_path)).facts["yaml"]
-    assert text.startswith("extends: forward\n")
-    file = tmp_path / "variant.yaml"
-    file.write_text(text)
-    assert rg.load(file).resolve().spec.plain() == rg.load("forward", **_kept(changed)).resolve().spec.plain()
-
-
-@pytest.mark.parametrize("scene", [None, "lone", "endless"])
-def test_a_variant_shows_the_scene_by_the_camera_that_was_moved(
-    service: RenderService, tmp_path: Path, scene: str | None
-) -> None:
-    """Also where the scene has no camera, and its light comes from beside the one that frames it."""
-    ball = "scene: 1\nobjects: {ball: {shape: sphere, radius: 1, segments: 8}}\n"
-    (tmp_path / "lone.yaml").write_text(ball)
-    (tmp_path / "endless.yaml").write_text(ball + "cameras: {c: {eye: [0, 1, 4], far: .inf}}\n")
-    opened = replace(FORWARD, scene=scene and str(tmp_path / f"{scene}.yaml"))
-    state = ViewState(opened, tmp_path)
-    state.record(service.answer(state.request()))
-    before = picture(service.answer(state.request()), tmp_path)
-    for text in ('{"do": "hold", "on": true}', '{"do": "camera", "orbit": [0.4, 0.1]}', '{"do": "hold", "on": false}'):
-        state.apply(parse_message(text))
-    shown = picture(service.answer(state.request()), tmp_path)
-    assert (shown != before).any()
-    (tmp_path / "variant.yaml").write_text(
-        service.answer(VariantRequest(opened, state.selection, tmp_path)).facts["yaml"]
-    )
-    assert scene != "endless" or "far: .inf" in (tmp_path / "variant.yaml").read_text()
-    saved = service.answer(RenderRequest(rg.Selection(str(tmp_path / "variant.yaml"))))
-    np.testing.assert_array_equal(picture(saved, tmp_path), shown)
-    state.apply(parse_message('{"do": "undo"}'))
-    np.testing.assert_array_equal(picture(service.answer(state.request()), tmp_path), before)
-
-
-def test_what_does_not_link_is_not_saved(service: RenderService, tmp_path: Path) -> None:
-    service.answer(RenderRequest(FORWARD))
-    refused = service.answer(VariantRequest(FORWARD, replace(FORWARD, sets=("display.exposure=bright",)), tmp_path))
-    assert refused.problems
-    assert "yaml" not in refused.facts
-
-
-def _kept(selection: rg.Selection) -> dict[str, Any]:
-    return {"sets": selection.sets, "size": selection.size}
 
 
 def test_a_mistake_names_its_node_and_the_next_picture_is_drawn(service: RenderService) -> None:

@@ -1,6 +1,7 @@
 // The page: shows the state that comes from the server, and sends every action there as a message.
 import { $, choices, h, short } from "./dom.js";
-import { preview, showGraph, showPreviews } from "./graph.js";
+import { showEditor, showTypes, startEditor, takeAdded } from "./editor.js";
+import { preview, reveal, showGraph, showPreviews, startGraph } from "./graph.js";
 import { showParameters, startParameters } from "./parameters.js";
 import { address, showComparison, showPicture, showPixel, showSmall, showTexture, startPicture } from "./picture.js";
 import { showMemory, showTimes } from "./plan.js";
@@ -13,13 +14,17 @@ let picture = null;
 let comparison = null;
 let problems = [];
 let node = "";
+let link = null;      // the chosen link, with its words
+let saved = "";       // the name that was last saved under
+let draft = null;     // what saving would write, and the digest of what it replaces
 let still = false;  // an exported page renders nothing new
 let times = {};       // of the last still picture, by node
 const history = [];
 const TABS = ["graph", "memory", "times", "changes"];
 
 const act = {
-  node(id) { node = id; draw(); },
+  node(id) { node = id; link = null; draw(); },
+  link(found, words) { link = link?.words === words ? null : { ...found, words }; draw(); },
   enable(name) { send({ do: "set", path: `${name}.enabled`, value: true }); },
   port(name) {
     if (still && preview(name)) showSmall(name, preview(name));  // an exported page holds only the small one
@@ -34,6 +39,7 @@ function draw() {
     $("about").textContent = pipeline.description;
     document.title = `${pipeline.name} – rendergraph`;
     if (!pipeline.nodes[node]) node = "";
+    if (!pipeline.graph.links.some((one) => link?.words === `${one.source}.${one.source_port} → ${one.target}.${one.target_port}`)) link = null;
     choices($("node"), ["", ...Object.keys(pipeline.nodes)], node, (id) => id || "the pipeline");
     choices($("camera"), ["", ...pipeline.cameras], state.moved ? "" : state.camera ?? pipeline.cameras[0], (name) => name || "moved by hand");
     const ports = pipeline.graph.nodes.flatMap((one) => Object.entries(one.outputs)
@@ -43,14 +49,16 @@ function draw() {
     choices($("port"), shown, state.port ?? "", (name) => name || (pipeline.outputs[0] ?? "image"));
     const { camera, ...settings } = state.edits;  // a camera that moves leaves the fields alone
     showParameters($("parameters"), pipeline, node, settings);
-    showGraph($("graph"), pipeline, { times, culled: pipeline.plan.culled, chosen: node, wrong }, act);
+    showGraph($("canvas"), pipeline, { times, culled: pipeline.plan.culled, chosen: node, link: link?.words, wrong }, act);
+    showEditor(pipeline, node, link);
     showMemory($("memory"), pipeline);
   }
   choices($("other"), ["", ...new Set([...state.others, ...state.pipelines])], state.other ?? "", (name) => name || "nothing");
   if (!state.other && comparison) { comparison = null; showComparison({}, {}); }
   $("undo").disabled = !state.can_undo;
   $("redo").disabled = !state.can_redo;
-  $("save").disabled = $("copy").disabled = !state.flags.length;
+  $("save").disabled = !state.is_rewired && !Object.keys(state.edits).length;
+  $("copy").disabled = !state.flags.length;
   $("play").setAttribute("aria-pressed", state.playing);
   $("play").textContent = state.playing ? "Pause" : "Play";
   if (document.activeElement !== $("exposure")) $("exposure").value = state.exposure_ev ?? 0;
@@ -77,26 +85,38 @@ function showFigures() {
 
 function showProblems(extra = []) {
   const all = [...problems, ...(picture?.warnings ?? []), ...extra];
-  $("problems").hidden = all.length === 0;
+  $("problems").hidden = all.length === 0 && !state.is_behind;
   $("problems").replaceChildren(...all.map(({ file, line, column, code, text }) => {
     const place = file ? `${file}${line ? `:${line}:${column}` : ""}: ` : "";
     return h("p", { class: "mono" }, `${place}${code} ${text}`);
-  }), problems.length && picture ? h("p", {}, "Showing the last good picture.") : "");
+  }), problems.length && picture ? h("p", {}, "Showing the last good picture.") : "",
+  state.is_behind ? h("p", {}, `${state.file} has changed on the disk since it was changed here. Save shows the difference. `,
+    h("button", { onclick: () => send({ do: "reload" }) }, "Take the file's")) : "");
 }
 
 function showChanges() {
   if ($("changes").hidden) return;
   const rows = Object.entries(state.edits).map(([path, value]) => h("tr", {}, h("td", { class: "mono" }, path), h("td", { class: "mono" }, value),
     h("td", {}, h("button", { onclick: () => send({ do: "drop", path }) }, "Revert"))));
-  $("changes").replaceChildren(rows.length ? h("table", {}, ...rows) : h("p", { class: "quiet" }, "No changes."),
-    rows.length ? h("pre", {}, flags()) : "");
+  const none = !rows.length && !state.is_rewired;
+  $("changes").replaceChildren(none ? h("p", { class: "quiet" }, "No changes.") : h("table", {}, ...rows),
+    state.flags.length ? h("pre", {}, flags()) : "", state.is_rewired && draft ? h("pre", {}, draft.difference) : "");
+}
+
+function askDraft() {
+  if ($("saving").open) send({ do: "draft", name: $("file").value });
+  else if (!$("changes").hidden && state.is_rewired) send({ do: "draft" });
 }
 
 const quote = (word) => (/^[\w./=@+-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
 const flags = () => state.flags.map((flag) => `-s ${quote(flag)}`).join(" ");
 
-on("state", (facts) => { state = facts; showFrame(facts.frame); showProblems(); draw(); });  // clears a refusal
-on("pipeline", (facts) => { pipeline = facts; draw(); });
+on("state", (facts) => { state = facts; showFrame(facts.frame); showProblems(); draw(); askDraft(); });  // clears a refusal
+on("pipeline", (facts) => {
+  pipeline = facts;
+  node = takeAdded(pipeline.nodes) || node;
+  draw();
+});
 on("picture", (facts, files) => {
   picture = facts;
   comparison = null;  // it is of another picture; that with a still one follows
@@ -115,12 +135,14 @@ on("thumbnails", (facts, files) => { showPreviews(files, address); draw(); });
 on("against", (facts, files) => { comparison = files.other ? facts : null; showComparison(facts, files); showFigures(); });
 on("pixel", showPixel);
 on("problems", (facts) => { problems = facts.problems; showProblems(); draw(); });
-on("refused", (facts) => showProblems(facts.problems));
-on("saved", (facts) => {
-  if (facts.problems.length) return showProblems(facts.problems);
-  showProblems();
-  $("link").textContent = `saved ${facts.path}`;
+on("refused", (facts) => {
+  if ($("saving").open) $("draft").textContent = facts.problems.map((problem) => problem.text).join("\n");
+  else showProblems(facts.problems);
 });
+on("saved", (facts) => { saved = facts.path; $("link").textContent = `saved ${facts.path}`; });
+on("draft", (facts) => { draft = facts; $("draft").textContent = facts.difference || "no difference"; showChanges(); });
+on("notes", (facts) => { $("link").textContent = facts.notes.join("; "); });
+on("types", showTypes);
 
 function chooseTab(name) {
   for (const tab of TABS) {
@@ -129,6 +151,7 @@ function chooseTab(name) {
     $(`tab-${tab}`).tabIndex = tab === name ? 0 : -1;
   }
   draw();
+  askDraft();
 }
 
 function start() {
@@ -147,8 +170,16 @@ function start() {
   const byHand = () => chooseTab("changes");  // browsers deny the clipboard to pages of other machines over HTTP
   $("copy").onclick = () => (navigator.clipboard
     ? navigator.clipboard.writeText(flags()).then(() => { $("link").textContent = "copied"; }, byHand) : byHand());
-  $("save").onclick = () => { $("saving").returnValue = ""; $("saving").showModal(); };
-  $("saving").onclose = () => { if ($("saving").returnValue === "save") send({ do: "save", name: $("file").value }); };
+  $("save").onclick = () => {
+    $("saving").returnValue = "";
+    $("file").value = saved || state.file;
+    $("saving").showModal();
+    askDraft();
+  };
+  $("file").oninput = () => { if ($("file").checkValidity()) askDraft(); };
+  $("saving").onclose = () => {
+    if ($("saving").returnValue === "save") send({ do: "save", name: $("file").value, digest: draft?.name === $("file").value ? draft.digest : "" });
+  };
   TABS.forEach((tab, i) => {
     $(`tab-${tab}`).onclick = () => chooseTab(tab);
     $(`tab-${tab}`).onkeydown = (event) => {
@@ -160,11 +191,13 @@ function start() {
     };
   });
   document.addEventListener("keydown", (event) => {
-    if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || event.target.matches("input[type=text]")) return;
+    if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || event.target.matches("input[type=text], input[type=search]")) return;
     event.preventDefault();
     send({ do: event.shiftKey ? "redo" : "undo" });
   });
   startPicture();
+  startEditor((id) => { act.node(id); reveal($("canvas"), id); });
+  startGraph($("canvas"), [[$("zoom-out"), 0.8], [$("zoom-in"), 1.25], [$("zoom-fit"), 0]]);
   startParameters($("parameters"));
   chooseTab("graph");
   const exported = $("exported");  // an exported page holds its messages
@@ -172,7 +205,7 @@ function start() {
   still = true;
   for (const { kind, facts, files } of JSON.parse(exported.textContent)) dispatch(kind, facts, files);
   $("link").textContent = "a static page: everything is in this file";
-  for (const input of document.querySelectorAll("header button, #left .bar :is(button, select, input)")) input.disabled = true;
+  for (const input of document.querySelectorAll("header button, #left .bar :is(button, select, input), #graph-bar > button")) input.disabled = true;
   $("parameters").disabled = true;
 }
 

@@ -1,4 +1,5 @@
 // The graph: nodes as cards in SVG, cached out by ELK, which is loaded at first use.
+import { drop, fits, offer } from "./editor.js";
 import { h, s, short } from "./dom.js";
 
 const WIDE = 190, HEAD = 40, ROW = 18, PICTURE = 88;
@@ -7,6 +8,8 @@ let cached = null;     // the last layout, and its graph
 let latest = 0;
 let shown = null;    // what is shown
 let updates = 0;    // counts updates of the thumbnails
+let scale = 0;       // until the graph is first drawn
+let dragged = null;  // the end of a link that is being dragged: {output} or {input}
 
 const previews = new Map();  // port to the address of its thumbnail
 
@@ -112,13 +115,16 @@ function card(node, box, facts, act) {
     group.append(s("rect", { class: "time", x: 1, y: HEAD - 5, height: 3, width: Math.max(1, (ms / all) * (box.width - 2)) }));
     group.append(s("text", { x: box.width - 8, y: 16, "text-anchor": "end", class: "quiet" }, `${short(Number(ms.toFixed(2)))} ms`));
   }
-  inputs.forEach((name, i) => group.append(s("text", { x: 8, y: HEAD + (i + 0.5) * ROW + 4, class: "quiet" }, clip(name, 26))));
+  inputs.forEach((name, i) => {
+    const y = HEAD + (i + 0.5) * ROW;
+    group.append(s("text", { x: 8, y: y + 4, class: "quiet" }, clip(name, 26)), pin("input", node.id, name, 0, y));
+  });
   outputs.forEach(([name, output], i) => {
     const y = HEAD + (inputs.length + i + 0.5) * ROW + 4;
     group.append(s("g", {
       class: "port", ...button(`Show ${node.id}.${name}`, () => act.port(`${node.id}.${name}`)),
     }, s("title", {}, `${describeOutput(output)}${output.used ? "" : ", unused"}`),
-    s("text", { x: box.width - 8, y, "text-anchor": "end", class: output.used ? "" : "quiet" }, clip(name, 26))));
+    s("text", { x: box.width - 8, y, "text-anchor": "end", class: output.used ? "" : "quiet" }, clip(name, 26))), pin("output", node.id, name, box.width, y - 4));
   });
   const port = mainPort(node);
   if (port) {
@@ -128,6 +134,96 @@ function card(node, box, facts, act) {
     }, s("title", {}, `${node.id}.${port}`)));
   }
   return group;
+}
+
+// The end of a link in a drawing, from which one can be dragged.
+const pin = (side, node, port, x, y) => s("circle", { class: `pin ${side}`, "data-end": `${node}.${port}`, cx: x, cy: y, r: 5 },
+  s("title", {}, `drag to connect ${node}.${port}`));
+
+// Drag from a pin: a line follows, what fits stands out, and what is under the end is connected or offered.
+function startDrag(container, event) {
+  const from = event.target.closest?.(".pin");
+  const svg = container.querySelector("svg");
+  if (!from || event.button !== 0 || !svg) return;
+  event.preventDefault();
+  dragged = { [from.classList.contains("output") ? "output" : "input"]: from.dataset.end };
+  const start = from.getBoundingClientRect();
+  const frame = svg.getBoundingClientRect();
+  const at = (x, y) => [(x - frame.left) / scale, (y - frame.top) / scale];
+  const [x0, y0] = at(start.left + start.width / 2, start.top + start.height / 2);
+  const line = s("path", { class: "edge dragged" });
+  svg.append(line);
+  for (const card of svg.querySelectorAll("[data-node]")) card.classList.toggle("apart", !fits(card.dataset.node, dragged));
+  const move = (now) => {
+    const [x, y] = at(now.clientX, now.clientY);
+    const bend = Math.max(30, Math.abs(x - x0) / 2) * (dragged.output ? 1 : -1);
+    line.setAttribute("d", `M${x0},${y0}C${x0 + bend},${y0} ${x - bend},${y} ${x},${y}`);
+  };
+  const end = (now) => {
+    container.removeEventListener("pointermove", move);
+    const what = dragged;
+    dragged = null;
+    line.remove();
+    for (const card of svg.querySelectorAll(".apart")) card.classList.remove("apart");
+    if (now.type === "pointercancel") return;
+    const under = document.elementFromPoint(now.clientX, now.clientY);
+    const pinned = under?.closest(`.pin.${what.output ? "input" : "output"}`);
+    const card = under?.closest("[data-node]");
+    if (card && `${Object.values(what)[0]}`.split(".")[0] === card.dataset.node) return;  // back where it began
+    if (card && fits(card.dataset.node, what)) drop(card.dataset.node, what, pinned?.dataset.end.split(".")[1]);
+    else if (!card && container.contains(under)) offer(what);
+  };
+  container.setPointerCapture(event.pointerId);
+  container.addEventListener("pointermove", move);
+  container.addEventListener("pointerup", end, { once: true });
+  container.addEventListener("pointercancel", end, { once: true });
+}
+
+function zoom(container, factor, x = container.clientWidth / 2, y = container.clientHeight / 2) {
+  const svg = container.querySelector("svg");
+  if (!svg || !cached) return;
+  const before = scale;
+  scale = factor === 0 ? fitting(container) : Math.min(2, Math.max(0.15, scale * factor));
+  resize(svg);
+  container.scrollTo((container.scrollLeft + x) * scale / before - x, (container.scrollTop + y) * scale / before - y);
+}
+
+// The scale at which all of the graph is seen.
+function fitting(container) {
+  const { width, height } = cached.layout;
+  return Math.min(1, (container.clientWidth - 32) / (width + 4), (container.clientHeight - 44) / (height + 4));
+}
+
+function resize(svg) {
+  const { width, height } = cached.layout;
+  svg.setAttribute("width", (width + 4) * scale);
+  svg.setAttribute("height", (height + 4) * scale);
+  svg.setAttribute("viewBox", `0 0 ${width + 4} ${height + 4}`);
+}
+
+// Connect by dragging, move by dragging the ground, and zoom by Ctrl and the wheel or by buttons.
+export function startGraph(container, buttons) {
+  container.addEventListener("pointerdown", (event) => {
+    startDrag(container, event);
+    if (dragged || event.pointerType === "touch" || event.target.closest(".card, .hit")) return;
+    const [x, y, left, top] = [event.clientX, event.clientY, container.scrollLeft, container.scrollTop];
+    const move = (now) => container.scrollTo(left + x - now.clientX, top + y - now.clientY);
+    addEventListener("pointermove", move);
+    addEventListener("pointerup", () => removeEventListener("pointermove", move), { once: true });
+  });
+  container.addEventListener("wheel", (event) => {
+    if (!event.ctrlKey) return;
+    event.preventDefault();
+    const { left, top } = container.getBoundingClientRect();
+    zoom(container, Math.exp(-event.deltaY * 0.002), event.clientX - left, event.clientY - top);
+  }, { passive: false });
+  buttons.forEach(([button, factor]) => { button.onclick = () => zoom(container, factor); });
+}
+
+export function reveal(container, node) {
+  const card = container.querySelector(`[data-node="${CSS.escape(node)}"]`);
+  card?.scrollIntoView({ block: "center", inline: "center" });
+  card?.querySelector("[role=button]")?.focus({ preventScroll: true });
 }
 
 export const preview = (port) => previews.get(port);
@@ -140,7 +236,7 @@ export function showPreviews(files, address) {
 // Draw the graph; compute a new layout only for another graph.
 export async function showGraph(container, pipeline, facts, act) {
   if (!pipeline || container.hidden) return;
-  const next = JSON.stringify([pipeline.revision, updates, facts.times, facts.chosen, [...facts.wrong]]);
+  const next = JSON.stringify([pipeline.revision, updates, facts.times, facts.chosen, facts.link, [...facts.wrong]]);
   if (next === shown) return;
   shown = next;
   const call = ++latest;
@@ -150,25 +246,30 @@ export async function showGraph(container, pipeline, facts, act) {
     const layout = await (await loadElk()).layout(asElk(graph, pipeline.disabled));
     cached = { key, layout };
   }
-  if (call !== latest) return;  // a newer call has begun
+  if (call !== latest || dragged) { shown = null; return; }  // a newer call has begun, or a hand holds what is there
   const { layout } = cached;
   const box = new Map(layout.children.map((child) => [child.id, child]));
-  const svg = s("svg", { width: layout.width + 4, height: layout.height + 4, role: "group", "aria-label": "The graph" },
+  const svg = s("svg", { role: "group", "aria-label": "Nodes and links" },
     s("defs", {}, s("pattern", { id: "hatched", width: 8, height: 8, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)" },
       s("rect", { width: 8, height: 8, fill: "#7d8590", opacity: 0.12 }), s("line", { x1: 0, y1: 0, x2: 0, y2: 8, stroke: "#7d8590", "stroke-width": 3, opacity: 0.5 }))));
   layout.edges.forEach((edge, i) => {
     const link = graph.links[i];
     const output = graph.nodes.find((node) => node.id === link.source)?.outputs[link.source_port];
     const kind = output?.kind ?? "";
+    const words = `${link.source}.${link.source_port} → ${link.target}.${link.target_port}`;
+    const classes = ["edge", (kind === "function" || kind === "buffer") && kind, link.previous && "previous", facts.link === words && "chosen"];
     for (const section of edge.sections ?? []) {
-      svg.append(s("path", { class: `edge ${kind === "function" || kind === "buffer" ? kind : ""} ${link.previous ? "previous" : ""}`, d: edgePath(section) },
-        s("title", {}, `${link.source}.${link.source_port} → ${link.target}.${link.target_port}${output ? `: ${output.semantic}` : ""}`)));
+      const d = edgePath(section);
+      svg.append(s("path", { class: classes.filter(Boolean).join(" "), d }),
+        s("path", { class: "hit", d, "data-link": words, onclick: () => act.link(link, words) }, s("title", {}, `${words}${output ? `: ${output.semantic}` : ""}`)));
     }
   });
   for (const node of graph.nodes) svg.append(card(node, box.get(node.id), facts, act));
   for (const name of pipeline.disabled) svg.append(disabledCard(name, box.get(`disabled ${name}`), act));
   const focused = document.activeElement?.getAttribute?.("aria-label");
   const { scrollLeft, scrollTop } = container;
+  scale ||= Math.max(0.75, fitting(container));  // smaller text cannot be read
+  resize(svg);
   container.replaceChildren(svg);
   container.scrollTo(scrollLeft, scrollTop);
   if (focused) container.querySelector(`[aria-label="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });

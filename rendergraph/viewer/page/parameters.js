@@ -1,5 +1,6 @@
 // Input fields for a node, made from the declaration of its type.
 import { h } from "./dom.js";
+import { dependants, outputsFor } from "./editor.js";
 import { send } from "./socket.js";
 
 let held = null;     // the setting that a slider or a colour picker is moving: all of that is one step of undo
@@ -136,30 +137,10 @@ function setting(path, label, about, edits) {
   return row(path, label, about, path in edits, field(path, `p-${path}`, now));
 }
 
-// The outputs that an input accepts, without those that depend on its node: first those of the same semantic.
-function compatibleOutputs(graph, node, about) {
-  const readers = new Map();
-  for (const { source, target, previous } of graph.links) {
-    if (!previous) readers.set(source, [...(readers.get(source) ?? []), target]);
-  }
-  const after = new Set([node]);
-  for (const one of after) for (const reader of readers.get(one) ?? []) after.add(reader);
-  const exact = [], any = [];
-  for (const one of graph.nodes) {
-    if (after.has(one.id)) continue;
-    for (const [name, output] of Object.entries(one.outputs)) {
-      if (output.kind !== about.kind) continue;
-      if (output.semantic === about.semantic) exact.push(`${one.id}.${name}`);
-      else if (output.semantic === "any" || about.semantic === "any") any.push(`${one.id}.${name}`);
-    }
-  }
-  return [...exact, ...any];
-}
-
 function linkRow(graph, node, name, about, edits) {
   const path = `${node}.${name}`;
   const links = [editedValue(edits, path, about.links)].flat().filter(Boolean);
-  const words = [...new Set([...(about.optional || about.many ? [""] : []), ...links, ...compatibleOutputs(graph, node, about)])];
+  const words = [...new Set([...(about.optional || about.many ? [""] : []), ...links, ...outputsFor(graph, about, dependants(graph, node))])];
   // An input for several links has a list for each, and one more to add another.
   const now = about.many ? [...links, ""] : [links[0] ?? ""];
   const lists = now.map((link, at) => {

@@ -78,5 +78,5 @@ export function showTimes(container, picture, history) {
   container.replaceChildren(
     h("p", {}, `${short(picture.frame_ms)} ms for this picture, ${short(middle)} ms in the median of the last ${history.length}, on ${picture.device.renderer}${software}.`),
     frameGraph(history),
-    h("table", { class: "times" }, h("tr", {}, h("th", {}, "node"), h("th", {}, "type"), h("th", {}, "GPU ms"), h("th", {}, "CPU ms"), h("th", {}, "")), ...rows));
+    h("table", { class: "times" }, h("tr", {}, h("th", {}, "node"), h("th", {}, "type"), h("th", {}, "GPU ms"), h("th", {}, "CPU ms"), h("th", {}, "share")), ...rows));
 }

@@ -1,0 +1,224 @@
+"""The file that pages edit: its text is changed in place, linked without GL, and written.
+
+A change of the graph is an operation of `edit` on the text. Values are settings, as with `-s`, until the next such
+operation or until the file is saved: then they are written into the text, too.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from msgspec.structs import replace
+
+from rendergraph.catalog import Catalog
+from rendergraph.declare import Function, Views
+from rendergraph.document import Source, YamlLimits, from_plain, read_text
+from rendergraph.edit import PipelineText
+from rendergraph.edit import text as yaml_text
+from rendergraph.errors import InputError, Problem, RendergraphError, UsageError
+from rendergraph.resolve import diff, to_yaml
+from rendergraph.resolve.patches import settings
+from rendergraph.resources import shipped_pipelines, shipped_scenes
+from rendergraph.scene.camera_words import keys_of
+from rendergraph.session import stages
+from rendergraph.session.picture_metadata import is_picture
+from rendergraph.session.selection import Selection
+from rendergraph.session.values import Linked
+
+Operation = tuple[str, ...]
+
+
+def own_file(opened: Selection) -> Path | None:
+    """Return the file that was opened, if it is one that can be saved: neither shipped, nor a picture, nor text."""
+    source = opened.source
+    if not isinstance(source, str) or "\n" in source or source in shipped_pipelines() or is_picture(source):
+        return None
+    return path if (path := Path(source)).is_file() else None
+
+
+def text_of(opened: Selection) -> str:
+    """Return the text that the first operation changes: the file's, or one that extends a shipped pipeline."""
+    if (own := own_file(opened)) is not None:
+        return read_text(own, YamlLimits(), str(own))
+    if opened.source in shipped_pipelines():
+        return f"rendergraph: 1\nextends: {opened.source}\n"
+    if isinstance(opened.source, Mapping):
+        return to_yaml(from_plain(opened.source, Source("pipeline")), origins=False)
+    if "\n" in opened.source:
+        return opened.source
+    text = f"the graph of '{opened.label}' cannot be edited here; write a file of it, as with `rendergraph config`"
+    raise UsageError(Problem("RG500", text))
+
+
+def edited(pipeline: PipelineText, sets: Iterable[str], operations: Sequence[Sequence[Any]]) -> dict[str, str]:
+    """Write settings and do operations; return the settings that stand beside the text, by path.
+
+    Those are what a change of the graph does not touch: scenes, parameters of the pipeline, parts of sub-pipelines.
+    """
+    beside: dict[str, str] = {}
+    for text in sets:
+        (setting,) = settings([text])
+        if setting.scope or setting.node in (None, "scene"):
+            path, _, value = text.partition("=")
+            beside[path] = value
+        else:
+            pipeline.set(f"{setting.node}.{setting.name}", setting.value.plain())
+    for name, *words in operations:
+        getattr(pipeline, name)(*words)
+        if name in ("delete", "rename"):
+            mine = {path for path in beside if path.startswith(f"{words[0]}/")}
+            moved = {f"{words[-1]}{path[len(words[0]) :]}": beside[path] for path in mine if name == "rename"}
+            beside = {path: value for path, value in beside.items() if path not in mine} | moved
+    return beside
+
+
+def difference(before: str, after: str, name: str) -> str:
+    return "\n".join(difflib.unified_diff(before.splitlines(), after.splitlines(), name, name, n=2, lineterm=""))
+
+
+def problems_of(selection: Selection) -> list[dict[str, Any]]:
+    """Return what is wrong with a pipeline, as `check` says it, with the node of the edited text that each is at."""
+    try:
+        stages.check(stages.link(stages.resolve(selection)))
+    except RendergraphError as error:
+        return [problem.as_json() | {"node": _node_at(problem, selection)} for problem in error.problems]
+    return []
+
+
+def _node_at(problem: Problem, selection: Selection) -> str | None:
+    place = problem.place
+    if place is None:
+        return None
+    if (setting := place.option("--set")) is not None:
+        return setting.path.partition(".")[0]
+    if selection.text is None or place.file != selection.source:
+        return None
+    nodes = (yaml_text.spans(selection.text, ("nodes",))[-1].children or {}).items()
+    above = [name for name, span in nodes if selection.text.count("\n", 0, span.first) < place.line]
+    return above[-1] if above else None
+
+
+# --- what is written --------------------------------------------------------------------------------------------------
+
+
+def in_place(opened: Selection, selection: Selection, file: Path, text: str) -> str:
+    """Return a file's text with all changes: `run FILE` then draws what the page shows.
+
+    Raises:
+        InputError: the selection does not link.
+        UsageError: (RG500) something of it cannot be written into the text.
+    """
+    linked = stages.link(stages.resolve(selection))
+    wanted = _without_view(linked, selection)
+    if seen := _view_keys(selection, linked):
+        wanted["scene"] = _scene_keys(linked, file.parent) | seen
+    pipeline = PipelineText(text, file, Catalog.discover(opened.plugins))
+    beside = edited(pipeline, selection.sets, ())
+    for setting in settings([f"{path}={value}" for path, value in beside.items()]):
+        if setting.node is None and not setting.scope:
+            pipeline.set(setting.name, setting.value.plain())
+    plain = Selection(str(file), text=pipeline.text, plugins=opened.plugins, asset_roots=opened.asset_roots)
+    found = stages.resolve(plain).spec.plain()
+    for key in ("size", "scene"):
+        if found.get(key) != wanted.get(key):
+            pipeline.set(key, wanted.get(key))
+    if stages.resolve(replace(plain, text=pipeline.text)).spec.plain() != wanted:
+        text = "these changes cannot be written into the file itself, such as those of -p and within sub-pipelines"
+        raise UsageError(Problem("RG500", f"{text}; save under another name"))
+    return pipeline.text
+
+
+def variant(opened: Selection, selection: Selection, file: Path) -> str:
+    """Return the text of a new file that extends what was opened by all changes, among them the camera.
+
+    Raises:
+        InputError: the selection does not link.
+    """
+    if selection.text is None or own_file(opened) is None:
+        with contextlib.suppress(UsageError):  # what has no place there is written as a difference
+            return in_place(opened, selection, file, selection.text or f"rendergraph: 1\nextends: {opened.source}\n")
+    linked = stages.link(stages.resolve(selection))
+    before = stages.resolve(replace(opened, sets=(), patches=(), scene=None, size=None)).spec.plain()
+    changed = {"extends": opened.source} | diff(before, _without_view(linked, selection))
+    if seen := _view_keys(selection, linked):
+        changed["scene"] = _scene_keys(linked, file.parent) | seen
+    return to_yaml(from_plain(changed, Source("variant")), origins=False)
+
+
+def unlinked(opened: Selection, selection: Selection) -> str:
+    """Return the text of a file with changes that do not link, as far as it holds them."""
+    pipeline = PipelineText(selection.text or text_of(opened), Path(opened.label), Catalog.discover(opened.plugins))
+    for text in selection.sets:
+        try:
+            edited(pipeline, [text], ())
+        except RendergraphError:
+            continue  # that may be why it does not link
+    return pipeline.text
+
+
+def _without_view(linked: Linked, selection: Selection) -> dict[str, Any]:
+    """Return the resolved file with the scene's own cameras: one in words is no change of the scene."""
+    if selection.camera is None:
+        return linked.spec.plain()
+    return stages.resolve(replace(selection, camera=None)).spec.plain()
+
+
+def _view_keys(chosen: Selection, linked: Linked) -> dict[str, Any]:
+    """Return what a scene file says of a camera that was moved, and of the surroundings of the command line."""
+    keys: dict[str, Any] = {}
+    if chosen.camera is not None and "=" in chosen.camera:
+        values = {key: list(v) if isinstance(v, tuple) else v for key, v in keys_of(chosen.camera).items()}
+        names = [name for name in linked.scene.cameras if not name.startswith("--")]
+        keys["cameras"] = {(names or ["main"])[0]: values}
+    if chosen.environment is not None:
+        keys["environment"] = None if str(chosen.environment) == "none" else {"file": str(chosen.environment)}
+    if chosen.ground:
+        keys["environment"] = (keys.get("environment") or {}) | {"ground": True}
+    return keys | ({"variant": chosen.variant} if chosen.variant else {})
+
+
+def _scene_keys(linked: Linked, folder: Path) -> dict[str, Any]:
+    """Return the scene of a pipeline as a mapping that a file in a folder may hold."""
+    file, changes = linked.spec.scene, linked.spec.scene_changes
+    keys = dict(changes.plain()) if changes is not None else {}
+    if file is not None:
+        keys["extends"] = file.stem if file in shipped_scenes().values() else os.path.relpath(file, folder)
+    return keys
+
+
+# --- what can be added ------------------------------------------------------------------------------------------------
+
+
+def node_types(catalog: Catalog) -> list[dict[str, Any]]:
+    """Return every node type with what its ports take and make, for a list to choose from."""
+    found = []
+    for name in catalog.names():
+        try:
+            entry = catalog.get(name)
+        except InputError:  # a plugin's that cannot be imported
+            continue
+        inputs = entry.cls.inputs()
+        found.append(
+            {
+                "name": name,
+                "family": entry.family,
+                "doc": (entry.cls.__doc__ or "").strip().partition("\n\n")[0].replace("\n", " "),
+                "inputs": {key: _port(port, inputs) | {"optional": port.optional} for key, port in inputs.items()},
+                "outputs": {key: _port(port, inputs) for key, port in entry.cls.outputs().items()},
+            }
+        )
+    return sorted(found, key=lambda entry: str(entry["family"]))
+
+
+def _port(port: Any, inputs: Mapping[str, Any]) -> dict[str, Any]:
+    if isinstance(port, Function):
+        return {"kind": "function", "semantic": port.signature.name}
+    if isinstance(port, Views):
+        return {"kind": "view", "semantic": "any"}
+    meaning = port.semantic or getattr(inputs.get(getattr(port, "like", "") or ""), "semantic", None)
+    return {"kind": port.kind, "semantic": getattr(meaning, "name", "any")}
