@@ -71,6 +71,21 @@ class Drawing(Struct, eq=False, dict=True):
         self.runner.reset()
         self.times, self.number = [], 0 if lead is None else max(0, options.frames[0] - lead - 1)
 
+    def set(self, node: str, name: str, value: Any) -> bool:
+        """Give a parameter of a node another value from the next frame on, until `begin`.
+
+        Return False, and change nothing, where it is more than a uniform of programs that run in every frame.
+        """
+        graph = self.expanded.linked.graph
+        parameter = graph[node].type.cls.parameters().get(name) if node in graph else None
+        if parameter is None or parameter.role != "param" or node in self.runner.updating:
+            return False
+        try:
+            converted = parameter.convert(value)
+        except (TypeError, ValueError):
+            return False
+        return bool(self.executable.cells(node, name)) and self.executable.set_uniform(node, name, converted) is None
+
     def draw(self, number: int, camera: Camera | None = None) -> None:
         """Render a frame, with the scene as it is at its time.
 

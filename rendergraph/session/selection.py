@@ -143,6 +143,7 @@ class RenderKeywords(TypedDict, total=False):
     still: int | None
     subframes: int
     turntable: range | None
+    share: bool | None
 
 
 class RenderOptions(Struct, frozen=True):
@@ -166,6 +167,7 @@ class RenderOptions(Struct, frozen=True):
         subframes: number of moments while the camera's shutter is open, centred on the frame's, of whose light a frame
             is the mean. Histories advance once a frame; what is random differs from moment to moment.
         turntable: the frames in which the camera goes around its target once.
+        share: use kept values that other pipelines have made; by default in no test mode.
     """
 
     frames: range = range(1, 2)
@@ -183,6 +185,7 @@ class RenderOptions(Struct, frozen=True):
     still: int | None = None
     subframes: int = 1
     turntable: range | None = None
+    share: bool | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.frames, range) or not self.frames or min(self.frames[0], self.frames[-1]) < 1:
@@ -212,7 +215,8 @@ class RenderOptions(Struct, frozen=True):
     @property
     def shares(self) -> bool:
         """Whether kept values of other pipelines are used; the test modes compute all of them."""
-        return self.alias and not self.poison and self.shuffle is None
+        is_test = not self.alias or self.poison or self.shuffle is not None
+        return not is_test if self.share is None else self.share
 
     @classmethod
     def of(cls, keywords: RenderKeywords) -> RenderOptions:

@@ -17,6 +17,7 @@ from rendergraph import images, stamps
 from rendergraph.compile import Executable
 from rendergraph.errors import Place, Problem, RendergraphError, shown_file
 from rendergraph.metrics import measure
+from rendergraph.resolve.patches import settings
 from rendergraph.scene.cameras import bounding_sphere
 from rendergraph.session import stages
 from rendergraph.session.drawing import Drawing
@@ -85,6 +86,7 @@ class RenderService:
         self._timed: Executable | None = None
         self._pass_times: dict[str, dict[str, Any]] = {}
         self._rendered: _Rendered | None = None
+        self._has_slid = False  # the last drawing has another value than its pipeline says
 
     def answer(self, request: Request) -> Response:
         """Return the response; mistakes of the user are in it, not raised."""
@@ -152,10 +154,14 @@ class RenderService:
                 times[node] = dict(entry) | {"first": is_first}
         if rendered.request.still:
             self._timed, self._pass_times = rendered.drawing.executable, times
-            self._full_ms = sum(entry["gpu_ms"] or entry["cpu_ms"] for entry in times.values())
+            kept = {step.node for step in rendered.drawing.executable.kept.values()}  # these do not run again
+            again = (entry for node, entry in times.items() if node not in kept)
+            self._full_ms = sum(entry["gpu_ms"] or entry["cpu_ms"] for entry in again)
         return [entry | {"ran": node in ran} for node, entry in times.items()]
 
     def _render(self, request: RenderRequest) -> _Rendered:
+        if (rendered := self._slide(request)) is not None:
+            return rendered
         selection = request.selection
         if request.still or self._planned is None:
             linked = self._link(selection)
@@ -170,13 +176,35 @@ class RenderService:
             selection = self._reduce_size(selection, self._planned.linked.graph.size)
         return self._draw(self._expand(selection, request), request)
 
+    def _slide(self, request: RenderRequest) -> _Rendered | None:
+        """Draw the last moving picture with another value of one parameter, if that needs no linking."""
+        last = self._rendered
+        if last is None or last.request.still or request.still or request.port != last.request.port:
+            return None
+        before, after = last.request.selection, request.selection
+        changed = [text for text in after.sets if text not in before.sets]
+        drawing = last.drawing
+        if len(changed) != 1 or drawing is not self._gpu.cache.drawing:
+            return None
+        (setting,) = settings(changed)
+        others = [tuple(s for s in sets if s.partition("=")[0] != setting.text) for sets in (before.sets, after.sets)]
+        same_file = replace(before, sets=()) == replace(after, sets=()) and others[0] == others[1]
+        if not same_file or setting.node is None or setting.scope:
+            return None
+        with self._gpu.current():
+            if not drawing.set(setting.node, setting.name, setting.value.plain()):
+                return None
+            self._has_slid, drawing.times = True, []
+            drawing.draw(request.frame, request.camera)
+            return _Rendered(request, drawing.read(), last.name, drawing)
+
     def _draw(self, expanded: Expanded, request: RenderRequest) -> _Rendered:
         with self._gpu.current():
             drawing = self._gpu.cache.drawing
-            if isinstance(drawing, Drawing) and drawing.expanded is expanded:
+            if isinstance(drawing, Drawing) and drawing.expanded is expanded and not self._has_slid:
                 drawing.times = []
             else:
-                drawing = stages.compile(expanded, self._gpu)
+                drawing, self._has_slid = stages.compile(expanded, self._gpu), False
                 drawing.begin()
             drawing.draw(request.frame, request.camera)
             return _Rendered(request, drawing.read(), list(expanded.requests)[-1], drawing)
@@ -197,7 +225,7 @@ class RenderService:
             alias = self._planned.plan.memory.no_reuse_bytes > NO_ALIAS_BYTES
             shown = port if port in outputs else main
             options = RenderOptions(
-                outputs=(shown,), fps=request.fps, warm_up=False, timed=True, reuse=True, alias=alias
+                outputs=(shown,), fps=request.fps, warm_up=False, timed=True, reuse=True, alias=alias, share=True
             )
             if port and port not in outputs:
                 options = replace(options, taps=(port,))

@@ -452,11 +452,12 @@ def drag(hand: Hand, start: str, end: tuple[float, float] | str) -> None:
     """Drag the end of a link from a pin to the middle of an element, or to a point of the page."""
     hand.page.click("#zoom-fit")
     box = hand.page.locator(start).bounding_box()
-    to = hand.page.locator(end).bounding_box() if isinstance(end, str) else None
-    x, y = (to["x"] + to["width"] / 2, to["y"] + to["height"] / 2) if to else end
+    if isinstance(end, str):
+        to = hand.page.locator(end).bounding_box()
+        end = to["x"] + to["width"] / 2, to["y"] + to["height"] / 2
     hand.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     hand.page.mouse.down()
-    hand.page.mouse.move(x, y, steps=3)
+    hand.page.mouse.move(*end, steps=3)
     hand.page.mouse.up()
 
 
