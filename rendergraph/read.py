@@ -64,6 +64,14 @@ NODE = Table(
         Key("enabled", bool, "`false` takes the node out; nodes that read it read its input instead.", default=True),
     ),
 )
+VIEW = Table(
+    "'{}'",
+    (
+        Key("camera", TEXT, "A camera of the scene, or one in words: 'eye=0,1,5 target=0,1,0 fov=40'."),
+        Key("frame", whole(1, 100_000), "Number of the frame."),
+        Key("environment", TEXT, "Environment map: a shipped name, a file, or `none`."),
+    ),
+)
 _NOT_A_NODE = {"inputs": "a node cannot be called 'inputs'; rename it"}
 PIPELINE: Table = Table(
     "a pipeline",
@@ -88,6 +96,12 @@ PIPELINE: Table = Table(
             "warm_up",
             whole(1, 10_000),
             "Number of earlier frames that a frame depends on; each part of a split film starts so many frames early.",
+        ),
+        Key(
+            "views",
+            MapOf(VIEW, _NAMING, "name of a view"),
+            "Named views, each with a camera, a frame and an environment; `--view NAME` chooses one.",
+            example="views: {side: {camera: 'eye=4,1,0 target=0,1,0', frame: 30}}",
         ),
         Key("parameters", MapOf(PARAMETER, _NAMING), "Parameters of the pipeline, which its nodes use as $name."),
         Key("inputs", MapOf(INPUT, _NAMING), "Inputs of the pipeline when it is the type of a node."),

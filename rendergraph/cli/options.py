@@ -261,6 +261,9 @@ SELECTION_OPTIONS = {
         shell_complete=offered("cameras"),
         help="Camera of the scene to render from, or a camera in words: 'eye=0,1,5 target=0,1,0 fov=40'.",
     ),
+    "view": click.option(
+        "--view", metavar="NAME", help="View of the file's `views`: its camera, frame and environment, if not given."
+    ),
     "shutter": click.option(
         "--shutter",
         type=Parsed("SHARE", _share),

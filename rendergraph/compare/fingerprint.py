@@ -38,7 +38,7 @@ def run_key(planned: Planned, frame: int, reference: str) -> str:
     files = [str(linked.spec.scene), sources_digest(planned)]
     spec = linked.spec.to_yaml(origins=False)
     size = linked.graph.size
-    parts = [__version__, spec, files, linked.selection.view, size, frame, reference, *_metrics(planned)]
+    parts = [__version__, spec, files, linked.selection.view_fields, size, frame, reference, *_metrics(planned)]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 

@@ -479,7 +479,7 @@ def _study(base: Pipeline, frame: int, reference: str) -> dict[str, Any]:
 
     More values of an axis belong to the same study, and so do edited shaders: those runs are rendered again.
     """
-    view, spec = base.selection.view, base.resolve().spec
+    view, spec = base.selection.view_fields, base.resolve().spec
     width, height = spec.size
     return {
         "pipeline": spec.name,

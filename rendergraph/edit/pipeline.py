@@ -125,6 +125,10 @@ class PipelineText(Struct, eq=False):
         self._require_new(new)
         self._set(("nodes", new), node)
 
+    def view(self, name: str, values: Mapping[str, Any]) -> None:
+        """Add a named view, or replace it."""
+        self._set(("views", name), dict(values))
+
     def upgrade(self) -> None:
         """Rewrite what is spelt as in an earlier version: begin with the version of the format."""
         if "rendergraph" in self._whole() or "rendergraph" in self._own():

@@ -15,6 +15,7 @@ from msgspec import Struct
 
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.resources import shipped_pipelines
+from rendergraph.scene.environments import SHIPPED
 from rendergraph.session.selection import MOST_SUBFRAMES
 from rendergraph.stamps import record_read
 
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 PICTURES = frozenset({".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga"})
 """Extensions of pictures, which distinguish them from pipelines."""
+ENVIRONMENT_NAMES = frozenset({"none", *SHIPPED})
+"""What `--environment` takes that is no file."""
 _MOST_FRAMES = 10**9
 
 
@@ -40,11 +43,11 @@ def pipeline_metadata(linked: Linked) -> dict[str, str]:
     fields = {
         "pipeline": linked.spec.to_yaml(origins=False),
         "folder": None if path is None or path in shipped_pipelines().values() else _inside(path.parent),
-        **selection.view,
+        **selection.view_fields,
     }
     if selection.environment is not None:
-        name = selection.environment
-        fields["environment"] = "none" if name == Path("none") else shown_file(name.absolute())
+        name = str(selection.environment)
+        fields["environment"] = name if name in ENVIRONMENT_NAMES else shown_file(selection.environment.absolute())
     return {f"rendergraph:{name}": text for name, text in fields.items() if text is not None}
 
 

@@ -42,6 +42,7 @@ class Selection(Struct, frozen=True):
         ground: whether a ground is put below the scene's objects, also where its file asks for none.
         transparent: whether to set the parameter `transparent` of every node that has one: pictures get alpha.
         camera: name of the scene's camera; its first by default.
+        view: name of a view of the file, which gives the camera, environment and frame that are not chosen otherwise.
         shutter: overrides the cameras': how much of a frame's time it is open, 0 to 1.
         sets: values of `-s`, such as `ao.radius=0.8`.
         patches: merge patches, as files or mappings.
@@ -65,6 +66,7 @@ class Selection(Struct, frozen=True):
     asset_roots: tuple[Path, ...] = ()
     limits: tuple[tuple[str, int], ...] = ()
     plugins: tuple[Path, ...] = ()
+    view: str | None = None
     text: str | None = None
 
     def __post_init__(self) -> None:
@@ -85,7 +87,7 @@ class Selection(Struct, frozen=True):
                 raise UsageError(Problem("RG500", f"unknown limit '{name}'{suggestion(name, known)}"))
 
     @property
-    def view(self) -> dict[str, str]:
+    def view_fields(self) -> dict[str, str]:
         """What is chosen beside the pipeline's file and changes its pictures, as texts by field."""
         names = ("camera", "environment", "variant", "ground", "shutter")
         values = {name: getattr(self, name) for name in names}

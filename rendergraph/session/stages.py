@@ -25,8 +25,8 @@ import rendergraph.resolve
 import rendergraph.schedule
 from rendergraph.catalog import Catalog
 from rendergraph.document import Document, YamlLimits
-from rendergraph.errors import InputError, Option, Place, Problem, RendergraphError, UsageError
-from rendergraph.read import read
+from rendergraph.errors import InputError, Option, Place, Problem, RendergraphError, UsageError, suggestion
+from rendergraph.read import entries, read
 from rendergraph.resolve import PipelineSpec
 from rendergraph.scene.animate import complete, on_turntable
 from rendergraph.scene.facts import camera_facts, environment_facts, light_facts, material_facts, object_facts
@@ -34,7 +34,7 @@ from rendergraph.scene.model import Scene
 from rendergraph.scene.scene_data import scene_data_facts
 from rendergraph.session import driven
 from rendergraph.session.outputs import every_port, requested_outputs
-from rendergraph.session.picture_metadata import is_picture, read_picture_metadata
+from rendergraph.session.picture_metadata import ENVIRONMENT_NAMES, is_picture, read_picture_metadata
 from rendergraph.session.scenes import scene_of
 from rendergraph.session.selection import RenderOptions, Selection
 from rendergraph.session.values import Expanded, Linked, Planned, Resolved
@@ -71,11 +71,10 @@ def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
         picture = read_picture_metadata(Path(str(selection.source)), limits)
         source, frames, fps = picture.document, range(picture.frame, picture.frame + 1), picture.fps
         subframes = picture.subframes
-        view = {name: value for name, value in picture.view.items() if name not in selection.view}
-        if view.get("environment", Path("none")) != Path(
-            "none"
-        ):  # it must lie below an asset root: the user has not typed it
-            Roots.of_file(Path("x"), selection.asset_roots).check(view["environment"], Place(str(selection.source)))
+        view = {name: value for name, value in picture.view.items() if name not in selection.view_fields}
+        if (file := view.get("environment")) is not None and str(file) not in ENVIRONMENT_NAMES:
+            # It must lie below an asset root: the user has not typed it.
+            Roots.of_file(Path("x"), selection.asset_roots).check(file, Place(str(selection.source)))
         selection = replace(selection, **view)
     resolve_with = partial(
         rendergraph.resolve.resolve,
@@ -88,6 +87,10 @@ def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
         catalog=catalog,
     )
     spec = resolve_with(sets=selection.sets)
+    if selection.view is not None:
+        chosen = view_of(spec, selection.view)
+        frames = range(frame, frame + 1) if (frame := chosen.pop("frame", None)) else frames
+        selection = replace(selection, **{k: v for k, v in chosen.items() if k not in selection.view_fields})
     if selection.transparent:
         spec = resolve_with(sets=(*selection.sets, *_transparent(spec)))
     if spec.tree.get("rendergraph") is None:
@@ -95,6 +98,22 @@ def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
         note = spec.tree.problem("RG016", text).as_warning()
         spec = replace(spec, notes=(*spec.notes, note))
     return Resolved(selection=selection, catalog=catalog, spec=spec, frames=frames, fps=fps, subframes=subframes)
+
+
+def view_of(spec: PipelineSpec, name: str) -> dict[str, Any]:
+    """Return the fields of `Selection`, and the frame, that a named view of the file has."""
+    views = entries(spec.tree, "views")
+    if name not in views:
+        known = suggestion(name, views) if views else "; the file has no views"
+        raise UsageError(Problem("RG500", f"there is no view '{name}'{known}"))
+    found: dict[str, Any] = views[name].plain() or {}
+    if (environment := views[name].get("environment")) is not None:
+        file = Path(str(environment.data))
+        if environment.data not in ENVIRONMENT_NAMES:
+            roots = spec.source_roots.get(environment.source, spec.roots)
+            file = roots.check((environment.source.path or Path("x")).parent / file, environment.place)
+        found["environment"] = file
+    return found
 
 
 def _transparent(spec: PipelineSpec) -> list[str]:

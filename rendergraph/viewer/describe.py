@@ -9,6 +9,7 @@ from rendergraph.declare import FileContent, InOut, Input, Parameter
 from rendergraph.diagrams import graph_json, plan_json
 from rendergraph.errors import InputError
 from rendergraph.link import Graph, GraphNode
+from rendergraph.read import entries
 from rendergraph.scene.animate import moves
 from rendergraph.session.values import Linked, Planned
 from rendergraph.typecheck import accepts
@@ -56,6 +57,9 @@ def describe(planned: Planned) -> dict[str, Any]:
         "plan": plan_json(planned.plan),
         "cameras": [name for name in linked.scene.cameras if not name.startswith("--")],  # without one in words
         "outputs": list(graph.outputs),
+        "scene": spec.scene_name,
+        "environment": str(linked.selection.environment or ""),
+        "views": list(entries(spec.tree, "views")),
         "moves": moves(linked.scene),
         "warnings": [problem.as_json() for problem in linked.warnings],
     }

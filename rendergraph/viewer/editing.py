@@ -26,11 +26,11 @@ from rendergraph.resolve.patches import settings
 from rendergraph.resources import shipped_pipelines, shipped_scenes
 from rendergraph.scene.camera_words import keys_of
 from rendergraph.session import stages
-from rendergraph.session.picture_metadata import is_picture
+from rendergraph.session.picture_metadata import ENVIRONMENT_NAMES, is_picture
 from rendergraph.session.selection import Selection
 from rendergraph.session.values import Linked
 
-Operation = tuple[str, ...]
+_GROUND_KEYS = ("ground", "ground_height")
 
 
 def own_file(opened: Selection) -> Path | None:
@@ -115,7 +115,7 @@ def in_place(opened: Selection, selection: Selection, file: Path, text: str) -> 
     """
     linked = stages.link(stages.resolve(selection))
     wanted = _without_view(linked, selection)
-    if seen := _view_keys(selection, linked):
+    if seen := _view_keys(selection, linked, file.parent):
         wanted["scene"] = _scene_keys(linked, file.parent) | seen
     pipeline = PipelineText(text, file, Catalog.discover(opened.plugins))
     beside = edited(pipeline, selection.sets, ())
@@ -145,7 +145,7 @@ def variant(opened: Selection, selection: Selection, file: Path) -> str:
     linked = stages.link(stages.resolve(selection))
     before = stages.resolve(replace(opened, sets=(), patches=(), scene=None, size=None)).spec.plain()
     changed = {"extends": opened.source} | diff(before, _without_view(linked, selection))
-    if seen := _view_keys(selection, linked):
+    if seen := _view_keys(selection, linked, file.parent):
         changed["scene"] = _scene_keys(linked, file.parent) | seen
     return to_yaml(from_plain(changed, Source("variant")), origins=False)
 
@@ -168,15 +168,20 @@ def _without_view(linked: Linked, selection: Selection) -> dict[str, Any]:
     return stages.resolve(replace(selection, camera=None)).spec.plain()
 
 
-def _view_keys(chosen: Selection, linked: Linked) -> dict[str, Any]:
+def _view_keys(chosen: Selection, linked: Linked, folder: Path) -> dict[str, Any]:
     """Return what a scene file says of a camera that was moved, and of the surroundings of the command line."""
     keys: dict[str, Any] = {}
     if chosen.camera is not None and "=" in chosen.camera:
         values = {key: list(v) if isinstance(v, tuple) else v for key, v in keys_of(chosen.camera).items()}
         names = [name for name in linked.scene.cameras if not name.startswith("--")]
         keys["cameras"] = {(names or ["main"])[0]: values}
-    if chosen.environment is not None:
-        keys["environment"] = None if str(chosen.environment) == "none" else {"file": str(chosen.environment)}
+    name = str(chosen.environment)
+    if name == "none":
+        keys["environment"] = None
+    elif chosen.environment is not None:
+        own = linked.scene.recipe.get(("environment", ""), {})  # what the scene says of another file does not count
+        file = name if name in ENVIRONMENT_NAMES else os.path.relpath(name, folder)
+        keys["environment"] = {"file": file} | {key: None for key in own if key not in ("file", *_GROUND_KEYS)}
     if chosen.ground:
         keys["environment"] = (keys.get("environment") or {}) | {"ground": True}
     return keys | ({"variant": chosen.variant} if chosen.variant else {})

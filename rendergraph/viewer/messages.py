@@ -92,6 +92,8 @@ class SetMessage(PageMessage, frozen=True):
         if len(repr(self.value)) > LONGEST_VALUE:
             raise ValueError("the value is too long")
         is_name = isinstance(self.value, str) and _NAME.fullmatch(self.value)
+        if self.path in ("scene", "environment") and not is_name:
+            raise ValueError("choose a shipped one; write a file's path into the pipeline instead")
         if self.path.endswith(".type") and not is_name:  # no page may name a file
             raise ValueError("a type must be the name of a node type; write a file's path into the pipeline instead")
 
@@ -122,6 +124,18 @@ class CameraMessage(PageMessage, frozen=True):
 class LookMessage(PageMessage, frozen=True):
     port: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_/.@,=\[\]:-]*\Z", max_length=200)] | None = None
     exposure: float | None = None
+
+
+class ViewMessage(PageMessage, frozen=True):
+    """Look through a named view of the file."""
+
+    name: str
+
+
+class KeepViewMessage(PageMessage, frozen=True, tag="keep_view"):
+    """Write camera, frame and environment into the file as a named view."""
+
+    name: Annotated[str, Meta(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,99}\Z")]
 
 
 class FrameMessage(PageMessage, frozen=True):

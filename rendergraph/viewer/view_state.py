@@ -21,10 +21,12 @@ from rendergraph.catalog import Catalog
 from rendergraph.edit import PipelineText
 from rendergraph.errors import Place, Problem, RendergraphError, UsageError, shown_file
 from rendergraph.images.files import replace_text
-from rendergraph.resources import shipped_pipelines
+from rendergraph.resources import shipped_pipelines, shipped_scenes
 from rendergraph.scene.camera_words import camera_words, described_camera
+from rendergraph.scene.environments import SHIPPED
 from rendergraph.scene.model import Camera
-from rendergraph.session.selection import Selection
+from rendergraph.session import stages
+from rendergraph.session.selection import MOST_FRAMES, Selection
 from rendergraph.viewer import camera as cameras
 from rendergraph.viewer import editing, messages
 from rendergraph.viewer.messages import RenderRequest, Response
@@ -34,6 +36,9 @@ MOST_COMPARED = 50
 """Snapshots and pipelines that are kept to compare with."""
 CAMERA = "camera"
 """The path of the camera among the edits: a name, or words as `--camera` takes them."""
+ENVIRONMENT = "environment"
+FRAME = "frame"
+"""The path of the frame among the edits, which is no setting."""
 _FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.ya?ml")
 _BARE = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")  # a word that needs no quotes in YAML
 _KEYWORDS = frozenset({"null", "true", "false", "Null", "NULL", "True", "TRUE", "False", "FALSE"})
@@ -58,7 +63,7 @@ class Edits:
 
     @property
     def sets(self) -> tuple[str, ...]:
-        return tuple(f"{path}={value}" for path, value in self.current.items())
+        return tuple(f"{path}={value}" for path, value in self.current.items() if path != FRAME)
 
     @property
     def state(self) -> _State:
@@ -74,6 +79,14 @@ class Edits:
         if again and self.before and path in self.current:
             return replace(self, current=current, after=())
         return self.write(self.text, current)
+
+    def differs_by(self, path: str) -> bool:
+        """Whether the last change was of this path alone."""
+        if not self.before:
+            return False
+        text, before = self.before[-1]
+        others = ({p: v for p, v in states.items() if p != path} for states in (before, self.current))
+        return text == self.text and next(others) == next(others)
 
     def drop(self, path: str) -> Edits:
         left = {p: v for p, v in self.current.items() if p != path}
@@ -207,6 +220,8 @@ class ViewState:
             "others": list(self._others),
             "other": self._other,
             "pipelines": list(shipped_pipelines()),
+            "scenes": list(shipped_scenes()),
+            "environments": [*SHIPPED, "none"],
         }
 
     def record(self, response: Response) -> None:
@@ -226,10 +241,10 @@ class ViewState:
             given = (setting.partition("=") for setting in self.opened.sets)
             sets = {**{path: value for path, _, value in given}, **sets}
         pipeline = PipelineText(text, self.file, Catalog.discover(self.opened.plugins), [])
-        camera = {CAMERA: sets[CAMERA]} if CAMERA in sets else {}
-        others = [f"{path}={value}" for path, value in sets.items() if path not in camera]
+        view = {path: value for path, value in sets.items() if path in (CAMERA, FRAME)}
+        others = [f"{path}={value}" for path, value in sets.items() if path not in view]
         beside = editing.edited(pipeline, others, operations)
-        self.edits = self.edits.write(pipeline.text, beside | camera)
+        self.edits = self.edits.write(pipeline.text, beside | view)
         return pipeline.notes
 
     def draft(self, name: object) -> tuple[str, str, str]:
@@ -240,6 +255,10 @@ class ViewState:
             text = editing.in_place(self.opened, self.selection, path, self.edits.text or before)
         else:
             text = editing.variant(self.opened, self.selection, path)
+        if FRAME in self.edits.current:
+            pipeline = PipelineText(text, path, Catalog.discover(self.opened.plugins))
+            pipeline.view("page", {"frame": int(self.edits.current[FRAME])})
+            text = pipeline.text
         return text, editing.difference(before, text, path.name), _digest(before)
 
     def save(self, name: object, digest: str) -> str:
@@ -299,11 +318,11 @@ class ViewState:
             case messages.SetMessage(path, value, again):
                 self.edits = self.edits.set(path, value, again=again)
             case messages.DropMessage(path):
-                self.edits = self.edits.drop(path)
+                self._go_to(self.edits.drop(path))
             case messages.UndoMessage():
-                self.edits = self.edits.undo()
+                self._go_to(self.edits.undo())
             case messages.RedoMessage():
-                self.edits = self.edits.redo()
+                self._go_to(self.edits.redo())
             case messages.ReloadMessage():
                 self.edits = self.edits.write(None, {p: v for p, v in self.edits.current.items() if p == CAMERA})
                 self._saved = None, {}
@@ -313,9 +332,19 @@ class ViewState:
                 self.port = self.port if port is None else port
                 self.exposure = self.exposure if exposure is None else min(max(exposure, -24.0), 24.0)
             case messages.FrameMessage(number):
-                self.frame = min(max(number, 1), 1_000_000)
+                self.frame = min(max(number, 1), MOST_FRAMES)
+                self._keep_frame()
             case messages.PlayMessage(on):
                 self.playing = on
+                if not on:
+                    self._keep_frame()
+            case messages.ViewMessage(name):
+                self._look_through(name)
+            case messages.KeepViewMessage(name):
+                camera, environment = self.selection.camera, self.selection.environment
+                frame = self.frame if self.frame > 1 else None
+                values = {"camera": camera, "frame": frame, "environment": environment and str(environment)}
+                self.edit([["view", name, {key: value for key, value in values.items() if value is not None}]])
             case messages.HoldMessage(on):
                 was_held, self.held = self.held, on
                 self._keep_camera()
@@ -333,6 +362,24 @@ class ViewState:
                 shipped = structs.replace(self.opened, source=name, sets=(), patches=())
                 self._compare_with(name, selection or shipped)
         return True
+
+    def _go_to(self, edits: Edits) -> None:
+        if edits.current.get(FRAME) != self.edits.current.get(FRAME):
+            self.frame = int(edits.current.get(FRAME, 1))
+        self.edits = edits
+
+    def _keep_frame(self) -> None:
+        """Make the frame an edit; moving it on is one step of undo."""
+        if self.frame == int(self.edits.current.get(FRAME, 1)):
+            return
+        again = self.edits.differs_by(FRAME)
+        self.edits = self.edits.set(FRAME, self.frame, again=again)
+
+    def _look_through(self, name: str) -> None:
+        chosen = stages.view_of(stages.resolve(self.selection).spec, name)
+        others = {path: value for path, value in self.edits.current.items() if path not in (CAMERA, FRAME, ENVIRONMENT)}
+        self.camera, self.frame = None, int(chosen.get("frame", 1))
+        self.edits = self.edits.write(self.edits.text, others | {path: str(value) for path, value in chosen.items()})
 
     def _move(self, message: messages.CameraMessage) -> None:
         if message.name is not UNSET:

@@ -417,3 +417,22 @@ def test_doctor_says_what_to_install(cli: Any, monkeypatch: pytest.MonkeyPatch) 
     assert "apt install libgl1 libgl1-mesa-dri" in result.out
     assert "0       no      ACME      libGL.so.1 not loaded" in result.out
     assert "cannot render here yet" in result.out
+
+
+def test_a_view_gives_what_is_not_chosen_otherwise(cli: Any, tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").write_text(
+        "rendergraph: 1\nextends: forward\nsize: [16, 9]\n"
+        "views: {side: {camera: 'eye=4,1,0 target=0,1,0', environment: dawn, frame: 12}, out: {environment: ../x.hdr}}\n"
+    )
+    assert cli("run", "mine.yaml", "--view", "side", "-o", "a.png").code == 0
+    assert cli("run", "a.png", "-o", "b.png").code == 0
+    viewed = images.read("a.png")
+    np.testing.assert_array_equal(images.read("b.png"), viewed)
+    words = ("--camera", "eye=4,1,0 target=0,1,0", "--environment", "dawn", "--frames", "12-12")
+    assert cli("run", "mine.yaml", *words, "-o", "c.png").code == 0
+    np.testing.assert_array_equal(images.read("c.png"), viewed)
+    assert cli("run", "mine.yaml", "--view", "side", "--camera", "main", "-o", "d.png").code == 0
+    assert (images.read("d.png") != viewed).any()
+    assert "RG500 there is no view 'sid'; did you mean 'side'?" in cli("run", "mine.yaml", "--view", "sid").err
+    assert "RG500 there is no view 'sid'; the file has no views" in cli("run", "forward", "--view", "sid").err
+    assert "RG012 '../x.hdr' lies outside" in cli("run", "mine.yaml", "--view", "out").err

@@ -75,6 +75,7 @@ class Served:
             for number in (2, 1):  # the first message may be of a picture from before
                 tab.say(do="frame", number=number)
                 tab.hear("picture", still=True, frame=number)
+        self.state.edits = type(self.state.edits)()
 
 
 @contextmanager

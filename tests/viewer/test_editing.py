@@ -226,6 +226,13 @@ ACTIONS: list[dict[str, Any]] = [
     {"do": "set", "path": "glow.intensity", "value": 0.4},
     {"do": "camera", "orbit": [0.2, 0.05]},
     {"do": "camera", "zoom": [1.1]},
+    {"do": "frame", "number": 5},
+    {"do": "frame", "number": 9},
+    {"do": "set", "path": "environment", "value": "studio"},
+    {"do": "set", "path": "environment", "value": "none"},
+    {"do": "set", "path": "scene", "value": "shapes"},
+    {"do": "keep_view", "name": "side"},
+    {"do": "view", "name": "side"},
     {"do": "undo"},
     {"do": "redo"},
     {"do": "edit", "operations": [["insert", "glow", "bloom", "display.radiance"]]},
@@ -263,6 +270,48 @@ def test_any_fifty_actions_saved_are_what_the_page_shows(gl: rg.Session, folder:
     state.save("variant.yaml", "")
     state.save("mine.yaml", state.draft("mine.yaml")[2])
     for name in ("mine.yaml", "variant.yaml"):
-        answer = service.answer(RenderRequest(rg.Selection(name)))
+        answer = service.answer(RenderRequest(rg.Selection(name), frame=state.frame))
         (folder / "saved.png").write_bytes(answer.files["picture"])
         np.testing.assert_array_equal(read(folder / "saved.png"), shown, err_msg=name)
+
+
+def test_a_view_is_kept_in_the_file_and_looked_through(gl: rg.Session, state: ViewState, folder: Path) -> None:
+    service = RenderService(gl)
+    before = pixels(service, state, folder)
+    say(state, do="camera", orbit=[0.4, 0.1])
+    say(state, do="frame", number=7)
+    say(state, do="set", path="environment", value="overcast")
+    shown = pixels(service, state, folder)
+    say(state, do="keep_view", name="side")
+    say(state, do="drop", path="camera")
+    say(state, do="drop", path="frame")
+    say(state, do="drop", path="environment")
+    assert state.frame == 1
+    np.testing.assert_array_equal(pixels(service, state, folder), before)
+    say(state, do="view", name="side")
+    assert state.frame == 7
+    np.testing.assert_array_equal(pixels(service, state, folder), shown)
+    say(state, do="undo")
+    state.save("mine.yaml", state.draft("mine.yaml")[2])
+    assert "views:\n  side:\n    camera: " in (folder / "mine.yaml").read_text()
+    drawn = rg.load("mine.yaml", view="side").render(session=gl)
+    assert drawn.number == 7
+    np.testing.assert_array_equal(drawn.arrays["image"][..., :3], shown[..., :3])
+
+
+def test_a_frame_is_undone_and_saved_as_a_view(state: ViewState, folder: Path) -> None:
+    for number in (3, 4, 5):
+        say(state, do="frame", number=number)
+    say(state, do="set", path="display.exposure", value=1)
+    say(state, do="frame", number=8)
+    assert "views:\n  page: {frame: 8}\n" in state.save("variant.yaml", "")
+    for frame in (5, 5, 1):
+        say(state, do="undo")
+        assert state.frame == frame
+    assert not state.as_json()["can_undo"]
+
+
+@pytest.mark.parametrize("path", ["scene", "environment"])
+def test_a_page_chooses_shipped_surroundings_alone(state: ViewState, path: str) -> None:
+    with pytest.raises(UsageError, match="choose a shipped one"):
+        say(state, do="set", path=path, value="../x.hdr")

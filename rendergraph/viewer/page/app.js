@@ -47,8 +47,9 @@ function draw() {
     const shown = ["", ...pipeline.outputs.slice(1), ...ports];
     if (state.port && !shown.includes(state.port)) shown.push(state.port);
     choices($("port"), shown, state.port ?? "", (name) => name || (pipeline.outputs[0] ?? "image"));
-    const { camera, ...settings } = state.edits;  // a camera that moves leaves the fields alone
-    showParameters($("parameters"), pipeline, node, settings);
+    const { camera, frame, ...settings } = state.edits;  // a camera that moves leaves the fields alone
+    const { scenes, environments } = state;
+    showParameters($("parameters"), pipeline, node, settings, { scenes, environments });
     showGraph($("canvas"), pipeline, { times, culled: pipeline.plan.culled, chosen: node, link: link?.words, wrong }, act);
     showEditor(pipeline, node, link);
     showMemory($("memory"), pipeline);
@@ -109,7 +110,7 @@ function askDraft() {
 }
 
 const quote = (word) => (/^[\w./=@+-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
-const flags = () => state.flags.map((flag) => `-s ${quote(flag)}`).join(" ");
+const flags = () => [...state.flags.map((flag) => `-s ${quote(flag)}`), ...(state.edits.frame ? [`--frames ${state.edits.frame}-${state.edits.frame}`] : [])].join(" ");
 
 on("state", (facts) => { state = facts; showFrame(facts.frame); showProblems(); draw(); askDraft(); });  // clears a refusal
 on("pipeline", (facts) => {
@@ -139,7 +140,10 @@ on("refused", (facts) => {
   if ($("saving").open) $("draft").textContent = facts.problems.map((problem) => problem.text).join("\n");
   else showProblems(facts.problems);
 });
-on("saved", (facts) => { saved = facts.path; $("link").textContent = `saved ${facts.path}`; });
+on("saved", (facts) => {
+  saved = facts.path;
+  $("link").textContent = `saved ${facts.path}${state.edits.frame ? "; draw this frame with --view page" : ""}`;
+});
 on("draft", (facts) => { draft = facts; $("draft").textContent = facts.difference || "no difference"; showChanges(); });
 on("notes", (facts) => { $("link").textContent = facts.notes.join("; "); });
 on("types", showTypes);

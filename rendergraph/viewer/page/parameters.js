@@ -154,8 +154,33 @@ function linkRow(graph, node, name, about, edits) {
   return row(path, name, about, path in edits, lists);
 }
 
+// What is drawn, by which light and seen from where.
+function surroundings(pipeline, edits, { scenes = [], environments = [] }) {
+  const chooser = (path, names, value, doc) => {
+    const now = editedValue(edits, path, value);
+    const list = h("select", { id: `p-${path}`, onchange: () => (list.value ? set(path, list.value) : send({ do: "drop", path })) },
+      ...[...new Set([path === "scene" ? now : "", now, ...names])].map((name) => h("option", { value: name }, name || "the scene's own")));
+    list.value = now;
+    return row(path, path, { doc }, path in edits, [list]);
+  };
+  const view = h("select", { id: "p-view", onchange: () => { if (view.value) send({ do: "view", name: view.value }); } },
+    ...["", ...pipeline.views].map((name) => h("option", { value: name }, name || (pipeline.views.length ? "choose" : "none is kept"))));
+  const keep = h("button", { onclick: () => {
+    const name = document.getElementById("p-view-name");
+    if (name.value && name.checkValidity()) send({ do: "keep_view", name: name.value });
+    else name.reportValidity();
+  } }, "Keep view");
+  const name = h("input", { type: "text", id: "p-view-name", size: 8, pattern: "[A-Za-z_][A-Za-z0-9_\\-]*", required: true, placeholder: "name", "aria-label": "Name of the view to keep" });
+  return [
+    chooser("scene", scenes, pipeline.scene, "What is drawn."),
+    chooser("environment", environments, pipeline.environment, "The light from all around."),
+    row("view", "view", { doc: "Camera, frame and environment, kept in the file under a name." }, false, [view]),
+    row("view-name", "", {}, false, [name, keep]),
+  ];
+}
+
 // The parameters and inputs of a node, or those of the pipeline where no node is chosen.
-export function showParameters(container, pipeline, node, edits) {
+export function showParameters(container, pipeline, node, edits, surrounding = {}) {
   // A field that is being typed in stays. A drag ends and a colour picker closes when elements around them change, so
   // both wait.
   if (held !== null) return;
@@ -170,6 +195,7 @@ export function showParameters(container, pipeline, node, edits) {
     const own = Object.entries(pipeline.parameters);
     parts.push(h("p", { class: "doc" }, own.length ? "Parameters of the pipeline." : "Choose a node, here or in the graph."));
     for (const [name, found] of own) parts.push(setting(name, name, found, edits));
+    parts.push(...surroundings(pipeline, edits, surrounding));
   } else {
     const options = (words) => words.map((word) => h("option", { value: word }, word));
     const others = about.other_types.filter((word) => word !== about.type);
