@@ -21,4 +21,4 @@ from rendergraph.images.saving import (
     viewable_as,
 )
 from rendergraph.images.shown import Shown, shown
-from rendergraph.images.viewable import from_srgb, heat_map, signed_map, to_srgb, viewable
+from rendergraph.images.viewable import from_srgb, heat_map, mapped, signed_map, to_srgb, viewable

@@ -29,6 +29,7 @@ _LIGHT = frozenset({"radiance", "albedo", "emissive", "luminance"})
 _WINDOW_DEPTH = frozenset({"depth", "shadow_map"})  # reversed: greater is nearer
 _UNIT = frozenset({"display_color", "visibility", "occlusion", "material"})
 _NAN_COLOR = (255, 0, 255)
+_BELOW_COLOR, _ABOVE_COLOR = (40, 80, 255), (255, 40, 40)
 # Black through purple and orange to pale yellow: brightness alone gives the order.
 _HEAT = np.array([(0, 0, 4), (81, 18, 124), (183, 55, 121), (252, 137, 97), (252, 253, 191)], np.float64)
 _TILE_WIDTH, _TILE_HEIGHT = 320, 180
@@ -93,6 +94,40 @@ def viewable(array: Pixels, semantic: str = "any", encoding: str | None = None) 
     if colors.shape[-1] == 2:
         colors = np.concatenate([colors, np.zeros_like(colors[..., :1])], axis=-1)
     return np.ascontiguousarray(_grid(colors) if colors.ndim == 4 else colors)
+
+
+def mapped(array: Pixels, scale: str, low: float | None, high: float | None) -> tuple[Bytes, str]:
+    """Return a picture of a texture with a chosen range, and the mapping in words.
+
+    NaN is magenta; what lies beyond a chosen range is blue below it and red above it.
+
+    Args:
+        scale: `linear` and `log` from black to white, `heat` in false colours; the last shows the mean of channels.
+        low, high: the range, by default that of the finite values; `log` begins at the smallest value above 0.
+    """
+    array = array[..., np.newaxis] if array.ndim == 2 else array[..., :3]
+    values = array.astype(np.float64)
+    finite = values[np.isfinite(values) & ((values > 0) | (scale != "log"))]
+    bottom = float(finite.min()) if finite.size and low is None else low or 0.0
+    top = float(finite.max()) if finite.size and high is None else 1.0 if high is None else high
+    if scale == "log":
+        bottom = max(bottom, 1e-30)
+        part = np.log(np.maximum(values, bottom) / bottom) / max(math.log(max(top, bottom) / bottom), 1e-30)
+    else:
+        part = (values - bottom) / max(top - bottom, 1e-30)
+    if scale == "heat":
+        colors = heat_map(part.mean(axis=-1))
+    else:
+        shown = np.clip(np.nan_to_num(part, nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
+        colors = np.asarray(shown * 255 + 0.5).astype(np.uint8)
+        if colors.shape[-1] < 3:
+            colors = np.repeat(colors[..., :1], 3, axis=-1)
+    colors[(values < bottom).all(axis=-1) if low is not None else np.zeros(values.shape[:-1], bool)] = _BELOW_COLOR
+    colors[(values > top).any(axis=-1) if high is not None else np.zeros(values.shape[:-1], bool)] = _ABOVE_COLOR
+    colors[np.isnan(values).any(axis=-1)] = _NAN_COLOR
+    words = {"linear": "linear", "log": "logarithmic", "heat": "false colour"}[scale]
+    text = f"{words} from {bottom:.6g} to {top:.6g}; blue below, red above, magenta where it is NaN"
+    return np.ascontiguousarray(_grid(colors) if colors.ndim == 4 else colors), text
 
 
 def _colors(array: Pixels, semantic: str, *, light: bool) -> Bytes:

@@ -5,13 +5,23 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Union
+from typing import Annotated, Any, Literal, Union
 
 from msgspec import UNSET, Meta, Struct, UnsetType, ValidationError, convert, json
 
 from rendergraph.errors import Problem, UsageError
 from rendergraph.scene.model import Camera
 from rendergraph.session.selection import Selection
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a texture is shown: one channel or all, and a mapping of a range; by default as suits what it means."""
+
+    channel: str = ""
+    scale: str = ""
+    low: float | None = None
+    high: float | None = None
 
 
 @dataclass(frozen=True)
@@ -27,15 +37,16 @@ class RenderRequest:
     fps: float = 30.0
     port: str = ""
     exposure: float = 0.0
+    look: Look = Look()
     still: bool = True
     known_revision: int = 0
 
 
 @dataclass(frozen=True)
 class ThumbnailRequest:
-    """A small picture of every port of the last frame."""
+    """A small picture of the first texture of each of these nodes, as the last frame has it; None for every port."""
 
-    pass
+    nodes: frozenset[str] | None = None
 
 
 @dataclass(frozen=True)
@@ -124,6 +135,10 @@ class CameraMessage(PageMessage, frozen=True):
 class LookMessage(PageMessage, frozen=True):
     port: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_/.@,=\[\]:-]*\Z", max_length=200)] | None = None
     exposure: float | None = None
+    channel: Literal["", "R", "G", "B", "A"] | None = None
+    scale: Literal["", "linear", "log", "heat"] | None = None
+    low: float | UnsetType | None = UNSET
+    high: float | UnsetType | None = UNSET
 
 
 class ViewMessage(PageMessage, frozen=True):
@@ -136,6 +151,12 @@ class KeepViewMessage(PageMessage, frozen=True, tag="keep_view"):
     """Write camera, frame and environment into the file as a named view."""
 
     name: Annotated[str, Meta(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,99}\Z")]
+
+
+class VisibleMessage(PageMessage, frozen=True):
+    """The nodes of the graph that a page has in sight."""
+
+    nodes: Annotated[list[str], Meta(max_length=2000)]
 
 
 class FrameMessage(PageMessage, frozen=True):

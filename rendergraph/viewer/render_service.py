@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import singledispatchmethod
 from pathlib import Path
@@ -27,9 +27,10 @@ from rendergraph.session.outputs import every_port
 from rendergraph.session.selection import RenderOptions, Selection
 from rendergraph.session.values import Expanded, Linked, Planned
 from rendergraph.stamps import Stamps
+from rendergraph.textures import TextureDesc
 from rendergraph.viewer import messages
 from rendergraph.viewer.describe import describe
-from rendergraph.viewer.messages import RenderRequest, Request, Response
+from rendergraph.viewer.messages import Look, RenderRequest, Request, Response
 
 Pixels = npt.NDArray[Any]
 
@@ -64,7 +65,18 @@ class _Rendered:
         return self.frame.info(self.name)
 
     def display(self) -> npt.NDArray[np.uint8]:
-        return images.viewable_as(_expose(self.pixels, self.info, self.request.exposure), self.info)
+        return self.displayed()[0]
+
+    def displayed(self) -> tuple[npt.NDArray[np.uint8], str]:
+        """The picture, and how values become colours, if that was chosen."""
+        look, pixels = self.request.look, _expose(self.pixels, self.info, self.request.exposure)
+        if look == Look():
+            return images.viewable_as(pixels, self.info), ""
+        pixels = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
+        channel = "RGBA".find(look.channel) if look.channel else -1
+        if 0 <= channel < pixels.shape[-1]:
+            pixels = pixels[..., channel : channel + 1]
+        return images.mapped(pixels, look.scale or "linear", look.low, look.high)
 
 
 class RenderService:
@@ -111,7 +123,7 @@ class RenderService:
             finally:
                 self._files = {**self._files, **files}
         self._rendered, frame = rendered, rendered.frame
-        picture = rendered.display()
+        picture, mapping = rendered.displayed()
         warnings = tuple(one for one in frame.warnings if one.code != "RG620")  # the page can play
         if request.still:
             drawing = rendered.drawing
@@ -120,6 +132,7 @@ class RenderService:
             "size": [picture.shape[1], picture.shape[0]],
             "number": frame.number,
             "port": request.port,
+            "mapping": mapping,
             "passes": self._passes(rendered),
             "frame_ms": frame.frame_ms["median"],
             "device": dict(frame.device),
@@ -262,7 +275,12 @@ class RenderService:
         scale = min(1.0, THUMBNAIL / max(width, height))
         small = replace(last.selection, size=(max(1, round(width * scale)), max(1, round(height * scale))))
         ports = every_port(self._planned)
-        key = small, "*"
+        if request.nodes is not None:
+            found = (self._first_texture(node, ports) for node in sorted(request.nodes))
+            ports = tuple(port for port in found if port is not None)
+            if not ports:
+                return Response({"revision": self._revision})
+        key = small, f"* {' '.join(ports)}"
         if key not in self._expanded:
             options = RenderOptions(fps=last.fps, taps=ports, warm_up=False)
             self._expanded[key] = stages.expand(self._link(small), options)
@@ -273,6 +291,16 @@ class RenderService:
             for port, info in textures.items()
         }
         return Response({"revision": self._revision}, files)
+
+    def _first_texture(self, node: str, ports: Collection[str]) -> str | None:
+        """Return the first of a node's outputs that is a texture, and that was drawn."""
+        assert self._planned is not None  # its ports are asked for
+        graph = self._planned.linked.graph
+        if node not in graph:
+            return None  # it was there when the page asked
+        outputs = (f"{node}.{name}" for name in graph[node].node.outputs())
+        textures = {str(end) for end, info in graph.textures.items() if isinstance(info.desc, TextureDesc)}
+        return next((port for port in outputs if port in ports and port in textures), None)
 
     @_answer.register
     def _compare(self, request: messages.CompareRequest) -> Response:

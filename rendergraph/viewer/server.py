@@ -83,6 +83,7 @@ class Page:
     allowance: float = 0.0
     last: float = 0.0
     holds: bool = False
+    visible: frozenset[str] = frozenset()
 
     def put(self, kind: str, message: bytes | str) -> None:
         self.waiting.pop(kind, None)
@@ -127,6 +128,9 @@ class Server:
         self._details_of: RenderRequest | None = None  # a still picture whose comparison and thumbnails are missing
         self._has_problems = False  # the last picture failed, and pages know
         self._thumbnails_of: RenderRequest | None = None
+        self._has_thumbnails: frozenset[str] = frozenset()  # nodes, of that picture
+        self._thumbnails: dict[str, bytes] = {}
+        self._still: RenderRequest | None = None  # the last still picture
         self._judging: asyncio.Task[None] | None = None
         self._last: dict[str, bytes | str] = {}  # by kind, for pages that come later
         self._queries: dict[tuple[Page, type], tuple[Request, Callable[[Response], None]]] = {}
@@ -243,6 +247,11 @@ class Server:
             case messages.TypesMessage():
                 catalog = Catalog.discover(self._state.opened.plugins)
                 page.put("types", _text("types", {"types": editing.node_types(catalog)}))
+            case messages.VisibleMessage(nodes):
+                page.visible = frozenset(nodes)
+                if self._still is not None and not page.visible <= self._has_thumbnails:
+                    self._details_of = self._still
+                    self._wake.set()
             case messages.EditMessage(operations):
                 page.put("notes", _text("notes", {"notes": self._state.edit(operations)}))
                 self._changed()
@@ -332,7 +341,7 @@ class Server:
                 self._state.frame += 1
             self._request_picture()
         elif request.still:
-            self._details_of = request
+            self._details_of = self._still = request
 
     def _show(self, response: Response, request: RenderRequest) -> None:
         self._state.record(response)
@@ -357,13 +366,23 @@ class Server:
             del self._last["against"]
         if self._wake.is_set():
             return
-        request = replace(request, port="", exposure=0.0, known_revision=0)
+        request = replace(request, port="", exposure=0.0, look=messages.Look(), known_revision=0)
         if request != self._thumbnails_of:
-            response = await self._ask(messages.ThumbnailRequest())
-            if response is not None and response.files:
-                self._thumbnails_of = request
-                self._broadcast("thumbnails", response.facts, response.files)
+            self._thumbnails_of, self._has_thumbnails = request, frozenset()
+        missing = frozenset[str]().union(*(page.visible for page in self._pages)) - self._has_thumbnails
+        if missing and (response := await self._ask(messages.ThumbnailRequest(missing))) is not None:
+            self._has_thumbnails |= missing
+            if response.files:
+                self._send_thumbnails(response)
         self._details_of = None
+
+    def _send_thumbnails(self, response: Response) -> None:
+        """Send what is new to the pages; one that comes later gets all."""
+        new = {name: data for name, data in response.files.items() if self._thumbnails.get(name) != data}
+        self._thumbnails |= new
+        if new:
+            self._broadcast("thumbnails", response.facts, new)
+            self._last["thumbnails"] = _pack("thumbnails", response.facts, self._thumbnails)
 
     def _show_problems(self, problems: Sequence[Mapping[str, Any]]) -> None:
         self._has_problems = bool(problems)

@@ -138,6 +138,7 @@ class ViewState:
     playing: bool = False
     port: str = ""
     exposure: float = 0.0
+    look: messages.Look = field(default_factory=messages.Look)
     held: bool = False
     revision: int = 0
 
@@ -196,6 +197,7 @@ class ViewState:
             self.fps,
             self.port,
             self.exposure,
+            self.look,
             still=not (self.held or self.playing),
             known_revision=self.revision,
         )
@@ -215,6 +217,7 @@ class ViewState:
             "playing": self.playing,
             "port": self.port,
             "exposure_ev": self.exposure,
+            "look": vars(self.look),
             "camera": self.selection.camera,
             "moved": self.camera is not None or "=" in (self.selection.camera or ""),
             "others": list(self._others),
@@ -331,6 +334,11 @@ class ViewState:
             case messages.LookMessage(port, exposure):
                 self.port = self.port if port is None else port
                 self.exposure = self.exposure if exposure is None else min(max(exposure, -24.0), 24.0)
+                chosen = {name: getattr(message, name) for name in ("channel", "scale", "low", "high")}
+                changed = {
+                    k: v for k, v in chosen.items() if v is not UNSET and (v is not None or k in ("low", "high"))
+                }
+                self.look = replace(self.look, **changed)
             case messages.FrameMessage(number):
                 self.frame = min(max(number, 1), MOST_FRAMES)
                 self._keep_frame()

@@ -28,7 +28,9 @@ from rendergraph.images import (
     decode,
     decode_light,
     from_srgb,
+    heat_map,
     is_numbered,
+    mapped,
     numbered,
     output_for,
     read,
@@ -626,3 +628,26 @@ def test_a_png_is_written_without_openimageio(tmp_path: Path) -> None:
     code += "write('a.png', numpy.full((2, 3, 4), 7, 'u1'))\nassert 'OpenImageIO' not in sys.modules\n"
     subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
     assert (read(tmp_path / "a.png") == 7).all()
+
+
+def test_a_chosen_range_is_mapped_and_what_is_beyond_is_marked() -> None:
+    ramp = np.array([[0.0, 0.25, 0.5, 1.0, 2.0, np.nan, np.inf]], np.float32)
+    grey, words = mapped(ramp, "linear", None, 2.0)
+    assert words == "linear from 0 to 2; blue below, red above, magenta where it is NaN"
+    assert grey[0, :5, 0].tolist() == [0, 32, 64, 128, 255]
+    assert grey[0, 5].tolist() == [255, 0, 255]
+    assert grey[0, 6].tolist() == [255, 40, 40]
+    below, _ = mapped(ramp, "linear", 0.5, 1.0)
+    assert below[0, 0].tolist() == [40, 80, 255]
+    assert below[0, 2:4, 0].tolist() == [0, 255]
+    steps = np.array([[0.01, 0.1, 1.0, 10.0]])
+    assert mapped(steps, "log", None, None)[0][0, :, 0].tolist() == [0, 85, 170, 255]
+    heat, _ = mapped(np.stack([steps] * 3, axis=-1), "heat", 0.0, 10.0)
+    np.testing.assert_array_equal(heat, heat_map(steps / 10))
+
+
+@pytest.mark.parametrize("scale", ["linear", "log", "heat"])
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, 3.0])
+def test_a_constant_texture_has_a_picture_in_every_mapping(scale: str, value: float) -> None:
+    array = np.full((2, 2, 3, 2), value, np.float32)
+    assert mapped(array, scale, None, None)[0].shape == (2, 6, 3)

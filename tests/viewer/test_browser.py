@@ -587,3 +587,63 @@ def test_axe_finds_nothing_in_the_dialogs(page: Hand) -> None:
     page.page.wait_for_selector("#draft:has-text('light_2')")
     found += axe.Axe().run(page.page).response["violations"]
     assert [(each["id"], [node["target"] for node in each["nodes"]][:3]) for each in found] == []
+
+
+@pytest.mark.nightly
+def test_a_texture_is_shown_by_layer_channel_and_range(show: Callable[..., Hand]) -> None:
+    hand = show()
+    hand.after(lambda: hand.page.select_option("#port", "environment.specular"))
+    hand.page.wait_for_selector("#layer option:has-text('+y')", state="attached")
+    hand.after(lambda: hand.page.select_option("#layer", "2"))
+    assert hand.page.input_value("#port") == "environment.specular"
+    hand.after(lambda: hand.page.select_option("#scale", "log"))
+    hand.after(lambda: hand.page.fill("#high", "0.5") or hand.page.keyboard.press("Enter"))
+    hand.page.wait_for_selector("#mapping:has-text('to 0.5')")
+    hand.after(lambda: hand.page.select_option("#channel", "G"))
+    hand.page.wait_for_selector("#texture:has-text('R:')")
+    hand.after(lambda: hand.page.select_option("#port", ""))
+    hand.page.wait_for_selector("#layer", state="hidden")
+
+
+@pytest.mark.nightly
+def test_parts_of_the_page_are_resized_and_shown_alone(show: Callable[..., Hand]) -> None:
+    hand = show()
+    wide = "document.getElementById('left').clientWidth"
+    before = hand.page.evaluate(wide)
+    hand.page.focus("#split")
+    for _ in range(5):
+        hand.page.keyboard.press("ArrowRight")
+    assert hand.page.evaluate(wide) == pytest.approx(before + 0.1 * VIEWPORT["width"], abs=3)
+    hand.page.keyboard.press("g")
+    assert hand.page.is_hidden("#picture")
+    hand.page.keyboard.press("p")
+    assert hand.page.is_hidden("#canvas")
+    assert hand.page.is_visible("#picture")
+    hand.page.keyboard.press("p")
+    assert hand.page.is_visible("#canvas")
+    hand.page.focus("[id='p-shadows.type']")
+    assert hand.text("#help").startswith("Filter the results of depth tests")
+
+
+@pytest.mark.nightly
+def test_hundreds_of_changes_leave_nothing_behind(show: Callable[..., Hand]) -> None:
+    """The page grows by nothing: elements, listeners of addresses and pictures."""
+    hand = show()
+    hand.choose("shadows")
+
+    def swap(name: str) -> None:
+        hand.after(lambda: hand.page.select_option("[id='p-shadows.type']", name))
+        hand.page.wait_for_selector(f"#canvas .card[data-node=shadows] text:text-is('{name}')")
+
+    def measure() -> tuple[int, int]:
+        hand.page.request_gc()
+        heap = "performance.memory.usedJSHeapSize"
+        return hand.page.evaluate("document.querySelectorAll('*').length"), hand.page.evaluate(heap)
+
+    for name in ("shadow_vsm", "shadow_pcss", "shadow_pcf") * 5:
+        swap(name)
+    elements, heap = measure()
+    for name in ("shadow_vsm", "shadow_pcss", "shadow_pcf") * 30:
+        swap(name)
+    assert measure()[0] == elements
+    assert measure()[1] < 1.3 * heap + 2e6

@@ -243,7 +243,7 @@ ACTIONS: list[dict[str, Any]] = [
     {"do": "edit", "operations": [["connect", "display.radiance", ["light.radiance"]], ["delete", "glow"]]},
     {"do": "edit", "operations": [["rename", "glow", "halo"]]},
     {"do": "edit", "operations": [["insert", "smooth", "fxaa", "outputs.image"]]},
-    {"do": "edit", "operations": [["retype", "shadows", "shadow_hard"]]},
+    {"do": "edit", "operations": [["retype", "shadows", "shadow_vsm"]]},
     {"do": "edit", "operations": [["disable", "shadows"]]},
     {"do": "edit", "operations": [["enable", "shadows"]]},
     {"do": "edit", "operations": [["disconnect", "light.lookup"]]},

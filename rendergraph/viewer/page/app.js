@@ -3,8 +3,9 @@ import { $, choices, h, short } from "./dom.js";
 import { showEditor, showTypes, startEditor, takeAdded } from "./editor.js";
 import { preview, reveal, showGraph, showPreviews, startGraph } from "./graph.js";
 import { showParameters, startParameters } from "./parameters.js";
-import { address, showComparison, showPicture, showPixel, showSmall, showTexture, startPicture } from "./picture.js";
+import { address, showComparison, showLooking, showPicture, showPixel, showSmall, showTexture, startPicture } from "./picture.js";
 import { showMemory, showTimes } from "./plan.js";
+import { startLayout } from "./layout.js";
 import { connect, dispatch, on, send } from "./socket.js";
 import "./slider.js";
 
@@ -23,7 +24,7 @@ const history = [];
 const TABS = ["graph", "memory", "times", "changes"];
 
 const act = {
-  node(id) { node = id; link = null; draw(); },
+  node(id) { if (node !== id) $("right").scrollTop = 0; node = id; link = null; draw(); },
   link(found, words) { link = link?.words === words ? null : { ...found, words }; draw(); },
   enable(name) { send({ do: "set", path: `${name}.enabled`, value: true }); },
   port(name) {
@@ -45,13 +46,15 @@ function draw() {
     const ports = pipeline.graph.nodes.flatMap((one) => Object.entries(one.outputs)
       .filter(([, output]) => output.format).map(([name]) => `${one.id}.${name}`));
     const shown = ["", ...pipeline.outputs.slice(1), ...ports];
-    if (state.port && !shown.includes(state.port)) shown.push(state.port);
-    choices($("port"), shown, state.port ?? "", (name) => name || (pipeline.outputs[0] ?? "image"));
+    const port = (state.port ?? "").split("[")[0];  // without layer and mip
+    if (!shown.includes(port)) shown.push(port);
+    choices($("port"), shown, port, (name) => name || (pipeline.outputs[0] ?? "image"));
     const { camera, frame, ...settings } = state.edits;  // a camera that moves leaves the fields alone
     const { scenes, environments } = state;
     showParameters($("parameters"), pipeline, node, settings, { scenes, environments });
     showGraph($("canvas"), pipeline, { times, culled: pipeline.plan.culled, chosen: node, link: link?.words, wrong }, act);
     showEditor(pipeline, node, link);
+    showLooking(pipeline, state);
     showMemory($("memory"), pipeline);
   }
   choices($("other"), ["", ...new Set([...state.others, ...state.pipelines])], state.other ?? "", (name) => name || "nothing");
@@ -126,6 +129,7 @@ on("picture", (facts, files) => {
   showFrame(facts.frame);
   showProblems();
   showPicture(facts, files);
+  $("mapping").textContent = facts.mapping;
   showFigures();
   if (!facts.still) return;
   times = Object.fromEntries(facts.passes.map((pass) => [pass.node, pass.gpu_ms ?? pass.cpu_ms]));
@@ -199,6 +203,7 @@ function start() {
     event.preventDefault();
     send({ do: event.shiftKey ? "redo" : "undo" });
   });
+  startLayout();
   startPicture();
   startEditor((id) => { act.node(id); reveal($("canvas"), id); });
   startGraph($("canvas"), [[$("zoom-out"), 0.8], [$("zoom-in"), 1.25], [$("zoom-fit"), 0]]);

@@ -1,27 +1,33 @@
-// The graph: nodes as cards in SVG, cached out by ELK, which is loaded at first use.
+// The graph: nodes as cards in SVG, laid out by ELK.
 import { drop, fits, offer } from "./editor.js";
-import { h, s, short } from "./dom.js";
+import { s, short } from "./dom.js";
+import { send } from "./socket.js";
 
 const WIDE = 190, HEAD = 40, ROW = 18, PICTURE = 88;
-let elk = null;
+let elk = null;      // the worker, or ELK itself
+let asked = 0;
+const waiting = new Map();  // layouts that were asked for, by number
 let cached = null;     // the last layout, and its graph
 let latest = 0;
-let shown = null;    // what is shown
-let updates = 0;    // counts updates of the thumbnails
+let drawn = null;    // what is drawn: its content, cards and lines
 let scale = 0;       // until the graph is first drawn
 let dragged = null;  // the end of a link that is being dragged: {output} or {input}
 
 const previews = new Map();  // port to the address of its thumbnail
 
-function loadElk() {
-  elk ??= new Promise((resolve, reject) => {
-    if (globalThis.ELK) return resolve(new globalThis.ELK());
-    const script = h("script", { src: new URL("vendor/elk.bundled.js", document.baseURI) });
-    script.onload = () => resolve(new globalThis.ELK());
-    script.onerror = () => reject(new Error("the layout cannot be loaded"));
-    document.head.append(script);
-  });
-  return elk;
+// Compute a layout: in a worker, or where the page has ELK in itself, as an exported one, with that.
+function computeLayout(graph) {
+  if (globalThis.ELK) {
+    elk ??= new globalThis.ELK();
+    return elk.layout(graph);
+  }
+  if (!elk) {
+    elk = new Worker(new URL("layout-worker.js", document.baseURI));
+    elk.onmessage = ({ data: { id, layout } }) => { waiting.get(id)(layout); waiting.delete(id); };
+  }
+  const id = ++asked;
+  elk.postMessage({ id, graph });
+  return new Promise((resolve) => { waiting.set(id, resolve); });
 }
 
 const mainPort = (node) => Object.keys(node.outputs).find((name) => previews.has(`${node.id}.${name}`));
@@ -43,7 +49,9 @@ function asElk(graph, disabled) {
       ...inputs.map((name, i) => port("in", name, inputs.length - i, HEAD + (i + 0.5) * ROW)),
       ...outputs.map((name, i) => port("out", name, i, HEAD + (inputs.length + i + 0.5) * ROW)),
     ];
-    return { id: node.id, ...shapeOf(node), ports, layoutOptions: { "elk.portConstraints": "FIXED_POS" } };
+    const before = cached?.layout.children.find((child) => child.id === node.id);
+    const position = before && { "elk.position": `(${before.x},${before.y})` };  // nodes of a layer keep their order
+    return { id: node.id, ...shapeOf(node), ports, layoutOptions: { "elk.portConstraints": "FIXED_POS", ...position } };
   });
   const edges = graph.links.map((link, i) => ({
     id: `e${i}`, sources: [`${link.source}|out|${link.source_port}`], targets: [`${link.target}|in|${link.target_port}`],
@@ -53,7 +61,7 @@ function asElk(graph, disabled) {
     children: [...children, ...disabled.map((name) => ({ id: `disabled ${name}`, width: WIDE, height: HEAD }))],
     layoutOptions: {
       "elk.algorithm": "layered", "elk.direction": "RIGHT", "elk.layered.spacing.nodeNodeBetweenLayers": "60",
-      "elk.spacing.nodeNode": "24", "elk.edgeRouting": "SPLINES", "elk.layered.feedbackEdges": "true",
+      "elk.layered.crossingMinimization.semiInteractive": "true", "elk.spacing.nodeNode": "24", "elk.edgeRouting": "SPLINES", "elk.layered.feedbackEdges": "true",
     },
   };
 }
@@ -96,25 +104,25 @@ function disabledCard(name, box, act) {
     s("text", { x: 8, y: 16, "font-weight": 600 }, name), s("text", { x: 8, y: 31, class: "quiet" }, "disabled"));
 }
 
-function card(node, box, facts, act) {
-  const { times, culled, chosen, wrong } = facts;
+const clip = (text, most) => (text.length > most ? `${text.slice(0, most - 1)}…` : text);
+
+// The parts of a card that change with pictures are filled in by `refresh`.
+function card(node, box, why, act) {
   const inputs = Object.keys(node.inputs), outputs = Object.entries(node.outputs);
-  const ms = times[node.id];
-  const idle = culled[node.id] !== undefined;
-  const all = Math.max(1e-9, Object.values(times).reduce((sum, one) => sum + one, 0));
-  const title = idle ? `${node.id} does not run: ${culled[node.id]}` : `${node.id}: ${node.type}`;
-  const clip = (text, most) => (text.length > most ? `${text.slice(0, most - 1)}…` : text);
+  const title = why === undefined ? `${node.id}: ${node.type}` : `${node.id} does not run: ${why}`;
+  const bar = s("rect", { class: "time", x: 1, y: HEAD - 5, height: 3, width: 0 });
+  const time = s("text", { x: box.width - 8, y: 16, "text-anchor": "end", class: "quiet" });
+  const image = s("image", {
+    x: 8, y: box.height - PICTURE - 4, width: box.width - 16, height: PICTURE, class: "port",
+    onclick: (event) => { event.stopPropagation(); act.port(`${node.id}.${mainPort(node)}`); },
+  });
   const group = s("g", {
-    class: ["card", idle && "idle", chosen === node.id && "chosen", wrong.has(node.id) && "wrong"].filter(Boolean).join(" "),
-    transform: `translate(${box.x},${box.y})`, role: "group", "aria-label": title, "data-node": node.id,
+    class: "card", transform: `translate(${box.x},${box.y})`, role: "group", "aria-label": title, "data-node": node.id,
     onclick: () => act.node(node.id),
   }, s("title", {}, title), s("rect", { class: "box", width: box.width, height: box.height, rx: 6 }),
+  s("rect", { x: 1, y: 8, width: 3, height: HEAD - 16, rx: 1, fill: familyColor(node.family) }),
   s("g", button(`Choose ${node.id}`, () => act.node(node.id)), s("rect", { class: "head", width: box.width, height: HEAD - 5 }),
-    s("text", { x: 8, y: 16, "font-weight": 600 }, clip(node.id, 18)), s("text", { x: 8, y: 31, class: "quiet" }, clip(node.type, 26))));
-  if (ms !== undefined) {
-    group.append(s("rect", { class: "time", x: 1, y: HEAD - 5, height: 3, width: Math.max(1, (ms / all) * (box.width - 2)) }));
-    group.append(s("text", { x: box.width - 8, y: 16, "text-anchor": "end", class: "quiet" }, `${short(Number(ms.toFixed(2)))} ms`));
-  }
+    s("text", { x: 8, y: 16, "font-weight": 600 }, clip(node.id, 18)), s("text", { x: 8, y: 31, class: "quiet" }, clip(node.type, 26))), bar, time);
   inputs.forEach((name, i) => {
     const y = HEAD + (i + 0.5) * ROW;
     group.append(s("text", { x: 8, y: y + 4, class: "quiet" }, clip(name, 26)), pin("input", node.id, name, 0, y));
@@ -126,14 +134,24 @@ function card(node, box, facts, act) {
     }, s("title", {}, `${describeOutput(output)}${output.used ? "" : ", unused"}`),
     s("text", { x: box.width - 8, y, "text-anchor": "end", class: output.used ? "" : "quiet" }, clip(name, 26))), pin("output", node.id, name, box.width, y - 4));
   });
-  const port = mainPort(node);
-  if (port) {
-    group.append(s("image", {
-      href: previews.get(`${node.id}.${port}`), x: 8, y: box.height - PICTURE - 4, width: box.width - 16, height: PICTURE,
-      class: "port", onclick: (event) => { event.stopPropagation(); act.port(`${node.id}.${port}`); },
-    }, s("title", {}, `${node.id}.${port}`)));
+  group.append(image);
+  return { node, group, bar, time, image, width: box.width };
+}
+
+// Put times, thumbnails and marks on the cards, where they have changed.
+function refresh({ cards, lines }, { times, culled, chosen, link, wrong }) {
+  const all = Math.max(1e-9, Object.values(times).reduce((sum, one) => sum + one, 0));
+  const put = (element, name, value) => { if (element.getAttribute(name) !== value) element.setAttribute(name, value); };
+  for (const { node, group, bar, time, image, width } of cards) {
+    const { id } = node;
+    put(group, "class", ["card", culled[id] !== undefined && "idle", chosen === id && "chosen", wrong.has(id) && "wrong"].filter(Boolean).join(" "));
+    const ms = times[id];
+    put(bar, "width", String(ms === undefined ? 0 : Math.max(1, (ms / all) * (width - 2))));
+    time.textContent = ms === undefined ? "" : `${short(Number(ms.toFixed(2)))} ms`;
+    const port = mainPort(node);
+    if (port) put(image, "href", previews.get(`${id}.${port}`));
   }
-  return group;
+  for (const { path, words } of lines) path.classList.toggle("chosen", link === words);
 }
 
 // The end of a link in a drawing, from which one can be dragged.
@@ -179,6 +197,26 @@ function startDrag(container, event) {
   container.addEventListener("pointercancel", end, { once: true });
 }
 
+// The nodes whose cards are in sight.
+function nodesInSight(container) {
+  const [left, top] = [container.scrollLeft / scale, container.scrollTop / scale];
+  const [right, bottom] = [left + container.clientWidth / scale, top + container.clientHeight / scale];
+  return cached.layout.children.filter(({ x, y, width, height }) => x < right && x + width > left && y < bottom && y + height > top)
+    .map(({ id }) => id).filter((id) => !id.startsWith("disabled "));
+}
+
+// Ask for the thumbnails of what is in sight, once scrolling pauses.
+let asking = null;
+let inSight = "";
+function askThumbnails(container) {
+  clearTimeout(asking);
+  asking = setTimeout(() => {
+    const nodes = nodesInSight(container);
+    if (inSight === (inSight = nodes.join())) return;
+    send({ do: "visible", nodes });
+  }, 100);
+}
+
 function zoom(container, factor, x = container.clientWidth / 2, y = container.clientHeight / 2) {
   const svg = container.querySelector("svg");
   if (!svg || !cached) return;
@@ -186,12 +224,39 @@ function zoom(container, factor, x = container.clientWidth / 2, y = container.cl
   scale = factor === 0 ? fitting(container) : Math.min(2, Math.max(0.15, scale * factor));
   resize(svg);
   container.scrollTo((container.scrollLeft + x) * scale / before - x, (container.scrollTop + y) * scale / before - y);
+  container.onscroll?.();
 }
 
 // The scale at which all of the graph is seen.
 function fitting(container) {
   const { width, height } = cached.layout;
   return Math.min(1, (container.clientWidth - 32) / (width + 4), (container.clientHeight - 44) / (height + 4));
+}
+
+// A colour for each family, far apart for neighbours in the alphabet.
+const hue = (family) => ([...(family ?? "")].reduce((sum, letter) => sum * 31 + letter.charCodeAt(0), 7) * 137) % 360;
+const familyColor = (family) => `hsl(${hue(family)} 55% 50%)`;
+
+// A small picture of the whole, with a frame around what is seen.
+function showMinimap(container, graph) {
+  const map = document.getElementById("minimap");
+  const { width, height, children } = cached.layout;
+  const family = new Map(graph.nodes.map((node) => [node.id, node.family]));
+  map.setAttribute("viewBox", `0 0 ${width + 4} ${height + 4}`);
+  const seen = s("rect", { class: "seen" });
+  map.replaceChildren(...children.map((box) => s("rect", { x: box.x, y: box.y, width: box.width, height: box.height, fill: familyColor(family.get(box.id)) })), seen);
+  const follow = () => {
+    const [x, y, wide, high] = [container.scrollLeft, container.scrollTop, container.clientWidth, container.clientHeight].map((v) => v / scale);
+    map.toggleAttribute("hidden", wide >= width && high >= height);
+    for (const [name, value] of Object.entries({ x, y, width: wide, height: high })) seen.setAttribute(name, value);
+    askThumbnails(container);
+  };
+  container.onscroll = follow;
+  map.onpointerdown = (event) => {
+    const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(map.getScreenCTM().inverse());
+    container.scrollTo(at.x * scale - container.clientWidth / 2, at.y * scale - container.clientHeight / 2);
+  };
+  follow();
 }
 
 function resize(svg) {
@@ -229,43 +294,53 @@ export function reveal(container, node) {
 export const preview = (port) => previews.get(port);
 
 export function showPreviews(files, address) {
-  updates += 1;
   for (const [port, blob] of Object.entries(files)) previews.set(port, address(`thumbnail ${port}`, blob));
 }
 
-// Draw the graph; compute a new layout only for another graph.
+// Draw the graph; another graph alone gets a new layout and new elements.
 export async function showGraph(container, pipeline, facts, act) {
-  if (!pipeline || container.hidden) return;
-  const next = JSON.stringify([pipeline.revision, updates, facts.times, facts.chosen, facts.link, [...facts.wrong]]);
-  if (next === shown) return;
-  shown = next;
+  if (!pipeline || container.hidden || container.offsetParent === null) return;
   const call = ++latest;
   const graph = pipeline.graph;
   const key = JSON.stringify([pipeline.disabled, graph.links, graph.nodes.map((node) => [node.id, Object.keys(node.inputs), Object.keys(node.outputs)])]);
   if (cached?.key !== key) {
-    const layout = await (await loadElk()).layout(asElk(graph, pipeline.disabled));
+    const layout = await computeLayout(asElk(graph, pipeline.disabled));
+    if (call !== latest) return;  // a newer call has begun
     cached = { key, layout };
   }
-  if (call !== latest || dragged) { shown = null; return; }  // a newer call has begun, or a hand holds what is there
+  if (dragged) return;  // a hand holds what is there
+  const content = JSON.stringify([key, graph.nodes.map((node) => [node.type, node.outputs]), pipeline.plan.culled]);
+  if (drawn?.content !== content) {
+    drawn = { content, ...drawGraph(container, pipeline, facts, act) };
+    showMinimap(container, graph);
+  }
+  refresh(drawn, facts);
+}
+
+function drawGraph(container, pipeline, facts, act) {
   const { layout } = cached;
+  const { graph } = pipeline;
   const box = new Map(layout.children.map((child) => [child.id, child]));
   const svg = s("svg", { role: "group", "aria-label": "Nodes and links" },
     s("defs", {}, s("pattern", { id: "hatched", width: 8, height: 8, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)" },
       s("rect", { width: 8, height: 8, fill: "#7d8590", opacity: 0.12 }), s("line", { x1: 0, y1: 0, x2: 0, y2: 8, stroke: "#7d8590", "stroke-width": 3, opacity: 0.5 }))));
+  const lines = [];
   layout.edges.forEach((edge, i) => {
     const link = graph.links[i];
     const output = graph.nodes.find((node) => node.id === link.source)?.outputs[link.source_port];
     const kind = output?.kind ?? "";
     const words = `${link.source}.${link.source_port} → ${link.target}.${link.target_port}`;
-    const classes = ["edge", (kind === "function" || kind === "buffer") && kind, link.previous && "previous", facts.link === words && "chosen"];
+    const classes = ["edge", (kind === "function" || kind === "buffer") && kind, link.previous && "previous"];
     for (const section of edge.sections ?? []) {
       const d = edgePath(section);
-      svg.append(s("path", { class: classes.filter(Boolean).join(" "), d }),
-        s("path", { class: "hit", d, "data-link": words, onclick: () => act.link(link, words) }, s("title", {}, `${words}${output ? `: ${output.semantic}` : ""}`)));
+      const path = s("path", { class: classes.filter(Boolean).join(" "), d });
+      lines.push({ path, words });
+      svg.append(path, s("path", { class: "hit", d, "data-link": words, onclick: () => act.link(link, words) },
+        s("title", {}, `${words}${output ? `: ${output.semantic}` : ""}`)));
     }
   });
-  for (const node of graph.nodes) svg.append(card(node, box.get(node.id), facts, act));
-  for (const name of pipeline.disabled) svg.append(disabledCard(name, box.get(`disabled ${name}`), act));
+  const cards = graph.nodes.map((node) => card(node, box.get(node.id), facts.culled[node.id], act));
+  svg.append(...cards.map(({ group }) => group), ...pipeline.disabled.map((name) => disabledCard(name, box.get(`disabled ${name}`), act)));
   const focused = document.activeElement?.getAttribute?.("aria-label");
   const { scrollLeft, scrollTop } = container;
   scale ||= Math.max(0.75, fitting(container));  // smaller text cannot be read
@@ -273,4 +348,5 @@ export async function showGraph(container, pipeline, facts, act) {
   container.replaceChildren(svg);
   container.scrollTo(scrollLeft, scrollTop);
   if (focused) container.querySelector(`[aria-label="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
+  return { cards, lines };
 }

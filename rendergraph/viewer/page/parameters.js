@@ -51,10 +51,12 @@ function numberField(path, id, about) {
   });
   const fields = [number];
   if (about.min !== null || about.kind === "number") {
-    // An unbounded range is shown around its default.
-    const low = about.min ?? Math.min(0, about.value, about.default ?? 0);
-    const wide = Math.max(Math.abs(about.default ?? about.value), Math.abs(about.value), about.kind === "integer" ? 8 : 0.5) * 4;
-    const high = about.max !== null && about.max - low <= 128 ? about.max : Math.min(about.max ?? Infinity, low + wide);
+    // Of an unbounded range, or one that is wide beside its default, the part around that is shown.
+    const usual = Math.max(Math.abs(about.default ?? about.value), Math.abs(about.value), about.kind === "integer" ? 8 : 0.5);
+    const isNarrow = about.min !== null && about.max !== null && about.max - about.min <= Math.max(20 * usual, 2);
+    const least = about.min === null || about.min < 0 ? -8 * usual : 0;
+    const low = isNarrow ? about.min : Math.max(about.min ?? Math.min(0, about.value, about.default ?? 0), least);
+    const high = isNarrow ? about.max : Math.min(about.max ?? Infinity, Math.max(low, 0) + 8 * usual);
     const grain = about.kind === "integer" ? 1 : roundStep((high - low) / 200);
     const range = h("input", {
       type: "range", id: `${id}-slider`, min: low, max: high, step: grain, value: about.value, "aria-label": `${path}, slider`,
@@ -154,6 +156,21 @@ function linkRow(graph, node, name, about, edits) {
   return row(path, name, about, path in edits, lists);
 }
 
+// The types of a node: those that fit its links, and the others.
+function typeField(node, about, edits) {
+  const options = (words) => words.map((word) => h("option", { value: word }, word));
+  const others = about.other_types.filter((word) => word !== about.type);
+  const types = h("select", { id: `p-${node}.type`, onchange: () => set(`${node}.type`, types.value) },
+    ...options([...new Set([about.type, ...about.types])]),
+    others.length ? h("optgroup", { label: "with other links" }, ...options(others)) : null);
+  types.value = editedValue(edits, `${node}.type`, about.type);
+  return types;
+}
+
+// The nodes that have alternatives, each with a list of them.
+const techniques = (pipeline, edits) => Object.entries(pipeline.nodes).filter(([, about]) => about.types.length > 1)
+  .map(([node, about]) => row(`${node}.type`, node, { doc: about.doc }, `${node}.type` in edits, [typeField(node, about, edits)]));
+
 // What is drawn, by which light and seen from where.
 function surroundings(pipeline, edits, { scenes = [], environments = [] }) {
   const chooser = (path, names, value, doc) => {
@@ -193,16 +210,12 @@ export function showParameters(container, pipeline, node, edits, surrounding = {
   const about = pipeline.nodes[node];
   if (!about) {
     const own = Object.entries(pipeline.parameters);
-    parts.push(h("p", { class: "doc" }, own.length ? "Parameters of the pipeline." : "Choose a node, here or in the graph."));
+    parts.push(h("p", { class: "doc" }, own.length ? "Parameters of the pipeline." : "Choose a node, here or in the graph, for its parameters."));
     for (const [name, found] of own) parts.push(setting(name, name, found, edits));
-    parts.push(...surroundings(pipeline, edits, surrounding));
+    parts.push(h("h2", {}, "Techniques"), ...techniques(pipeline, edits));
+    parts.push(h("h2", {}, "Surroundings"), ...surroundings(pipeline, edits, surrounding));
   } else {
-    const options = (words) => words.map((word) => h("option", { value: word }, word));
-    const others = about.other_types.filter((word) => word !== about.type);
-    const types = h("select", { id: `p-${node}.type`, onchange: () => set(`${node}.type`, types.value) },
-      ...options([...new Set([about.type, ...about.types])]),
-      others.length ? h("optgroup", { label: "with other links" }, ...options(others)) : null);
-    types.value = editedValue(edits, `${node}.type`, about.type);
+    const types = typeField(node, about, edits);
     const enabled = h("input", { type: "checkbox", id: `p-${node}.enabled`, onchange: () => set(`${node}.enabled`, enabled.checked) });
     enabled.checked = editedValue(edits, `${node}.enabled`, true);
     parts.push(h("p", { class: "doc" }, about.doc));
@@ -236,6 +249,9 @@ export function showParameters(container, pipeline, node, edits, surrounding = {
 
 // A field counts as being typed in from the first letter until its change or blur.
 export function startParameters(container) {
+  // What a row is for is also said below, where touch and the keyboard reach it.
+  const explain = ({ target }) => { document.getElementById("help").textContent = target.closest(".parameter")?.title ?? ""; };
+  for (const kind of ["focusin", "pointerdown", "pointerover"]) container.addEventListener(kind, explain);
   container.addEventListener("input", ({ target }) => { if (target.matches("input[type=number], input[type=text]")) writing = target; });
   container.addEventListener("change", () => { writing = shown.newRow = null; });  // the typed value is newer
   container.addEventListener("focusout", ({ relatedTarget }) => {

@@ -1,5 +1,5 @@
 // The picture, and moving the camera with mouse, wheel and keys.
-import { $, h, short } from "./dom.js";
+import { $, choices, h, short } from "./dom.js";
 import { send } from "./socket.js";
 
 const urls = new Map();
@@ -31,7 +31,10 @@ export function showPicture(facts, files) {
 // Fit the picture into the room; large texels keep sharp edges.
 function fit() {
   const [width, height] = size;
-  const room = Math.min($("stage").clientWidth, (0.68 * innerHeight * width) / height);
+  const wide = matchMedia("(min-width: 1100px)").matches;
+  const alone = document.body.classList.contains("picture-alone");
+  const share = alone ? 0.8 : wide ? Number(document.body.style.getPropertyValue("--picture") || 0.42) : 0.68;
+  const room = Math.min($("stage").clientWidth, (share * innerHeight * width) / height);
   const slider = $("slider");
   for (const image of [$("picture"), slider.under, slider.over]) {
     image.style.width = `${room}px`;
@@ -58,7 +61,40 @@ export function showPixel({ pixel }) {
   $("pixel").textContent = `(${pixel.at.join(", ")}${layer})  ${pixel.values.map(short).join("  ")}`;
 }
 
+const FACES = ["+x", "-x", "+y", "-y", "+z", "-z"];
+
+// What can be chosen of the shown texture, and how it is shown.
+export function showLooking(pipeline, state) {
+  const [base, part] = (state.port || "").split(/\[|\]/);
+  const [node, port] = (base || pipeline.graph.outputs[pipeline.outputs[0]] || "").split(".");
+  const output = pipeline.graph.nodes.find((one) => one.id === node)?.outputs[port];
+  const layers = base ? (output?.kind === "texture_cube" ? 6 : output?.layers ?? 1) : 1;
+  const mips = base ? output?.mips ?? 1 : 1;
+  const layer = /^\d+/.exec(part ?? "")?.[0] ?? "", mip = /mip=(\d+)/.exec(part ?? "")?.[1] ?? "0";
+  $("layer").parentElement.hidden = !(layers > 1);
+  $("mip").parentElement.hidden = !(mips > 1);
+  choices($("layer"), ["", ...Array(layers).keys()].map(String), layer, (name) => (name === "" ? "all" : output?.kind === "texture_cube" ? FACES[name] : name));
+  choices($("mip"), [...Array(mips).keys()].map(String), mip);
+  const look = () => {
+    const words = [$("layer").value, $("mip").value !== "0" && `mip=${$("mip").value}`].filter(Boolean).join(",");
+    send({ do: "look", port: words ? `${base}[${words}]` : base });
+  };
+  $("layer").onchange = $("mip").onchange = look;
+  const { channel = "", scale = "", low = null, high = null } = state.look ?? {};
+  $("channel").value = channel;
+  $("scale").value = scale;
+  for (const [id, value] of [["low", low], ["high", high]]) if (document.activeElement !== $(id)) $(id).value = value ?? "";
+}
+
+function startLooking() {
+  for (const name of ["channel", "scale"]) $(name).onchange = () => send({ do: "look", [name]: $(name).value });
+  for (const name of ["low", "high"]) {
+    $(name).onchange = () => send({ do: "look", [name]: $(name).value === "" ? null : Number($(name).value), ...($("scale").value ? {} : { scale: "linear" }) });
+  }
+}
+
 export function startPicture() {
+  startLooking();
   const stage = $("stage");
   const picture = $("picture");
   let last = null;
