@@ -17,7 +17,7 @@ test quick: export GALLIVM_PERF ?= nopt
 test quick nightly: export MALLOC_MMAP_THRESHOLD_ ?= 4194304
 test quick nightly: export MALLOC_ARENA_MAX ?= 2
 
-.PHONY: check nightly format lint types imports docs pages pictures test quick clean
+.PHONY: check nightly format lint types imports docs pages pictures proofs test quick clean
 
 check:
 	$(MAKE) --jobs=2 --output-sync --no-print-directory lint types imports pages
@@ -49,6 +49,10 @@ pages:
 # Redraw the pictures of docs/images as listed in pictures.yaml; all of them take some minutes. ONLY=ssao selects by name.
 pictures:
 	python docs/images/draw.py $(ONLY)
+
+# Measure again how near the tests of the nodes come to what they allow, and write docs/proofs.md.
+proofs:
+	python docs/measure_proofs.py
 
 test:
 	pytest -n $(WORKERS) --dist loadgroup

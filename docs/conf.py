@@ -25,7 +25,7 @@ author = "The rendergraph authors"
 copyright = f"2026, {author}"
 version = release = rendergraph.__version__
 
-extensions = ["myst_parser"]
+extensions = ["myst_parser", "sphinx-mathjax-offline"]
 myst_enable_extensions = ["colon_fence", "deflist", "attrs_inline", "dollarmath"]
 myst_heading_anchors = 3
 exclude_patterns = [

@@ -12,6 +12,8 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 
+from rendergraph.catalog import Catalog
+
 ROOT = Path(__file__).parents[1]
 LINK = re.compile(r"!?\[(?P<text>(?:[^\[\]]|\[[^\]]*\])*)\]\((?P<target>[^()\s]+)\)")
 
@@ -147,3 +149,11 @@ def test_links_of_the_built_pages_lead_somewhere() -> None:
             if not target.exists() or (url.fragment and known and unquote(url.fragment) not in known.names):
                 dead.append(f"{page.relative_to(home)}: {link}")
     assert not dead
+
+
+def test_the_page_of_proofs_has_every_node() -> None:
+    """`make proofs` writes it; a new node is measured with the next run."""
+    listed = set(
+        re.findall(r"^\| \[`(\w+)`\]", (ROOT / "docs" / "proofs.md").read_text(encoding="utf-8"), re.MULTILINE)
+    )
+    assert set(Catalog.discover().names()) == listed
