@@ -25,8 +25,8 @@ COLUMNS = ("technique", "compared with", "nearest difference", "values", "tests"
 ROW = "| {} | {} | {} | {} | {} | {} |"
 HEAD = """# How we know it is right
 
-Every node is tested against something that does not share its code: a closed form, NumPy in float64, rays, path tracing,
-a published value, or the same picture by another way. Each row says what a technique is compared with, and the
+Every node is tested against something that does not share its code: a closed form, NumPy in float64, rays, path
+tracing, a published value, or the same picture by another way. Each row says what a technique is compared with, and the
 difference that came nearest to what its test allows.
 
 Measured on {date} with {device} by `make proofs`.
@@ -114,7 +114,7 @@ def test_of(name: str, texts: dict[str, str]) -> str:
 def main() -> int:
     """Measure, write the page, and return the exit code of the tests."""
     recorder = Recorder()
-    np.testing.assert_allclose = recorder.record_close
+    np.testing.assert_allclose = recorder.record_close  # type: ignore[assignment]
     np.testing.assert_array_equal = recorder.record_equal
     code = pytest.main(["-q", "-p", "no:cacheprovider", str(ROOT / "tests" / "nodes")], plugins=[recorder])
     with rg.Session() as session:

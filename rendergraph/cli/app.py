@@ -39,6 +39,7 @@ _MODULES = {
 VERBS = (
     "run",
     "view",
+    "gallery",
     "check",
     "plan",
     "graph",

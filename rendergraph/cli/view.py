@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 @click.option("--allow-remote", is_flag=True, help="Allow a --host that other machines can reach; see below.")
 @click.option(
     "--export",
+    "target",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.html",
     help="Write the page as one static file instead of serving it.",
@@ -46,7 +47,7 @@ def command(
     port: int,
     host: str,
     allow_remote: bool,
-    export: Path | None,
+    target: Path | None,
     no_open: bool,
     fps: float,
     timeout: float,
@@ -82,7 +83,7 @@ def command(
         )
         raise UsageError(Problem("RG500", text + "pass --allow-remote to allow this, or use an SSH tunnel"))
     with contextlib.closing(RenderProcess(device, timeout)) as process:
-        if export is None:
+        if target is None:
             process.start()  # while the files are read
         other = None
         if against is not None:
@@ -90,12 +91,12 @@ def command(
             options.linked(other[1])
         state = ViewState(selection, Path.cwd(), fps=fps, against=other)
         options.linked(selection)  # reports mistakes before there is a page
-        if export is not None:
+        if target is not None:
             from rendergraph.session.gpu import Gpu
-            from rendergraph.viewer.export import export_page
+            from rendergraph.viewer.export import export
 
             with Gpu(device) as gpu:
-                options.put(export_page(state, gpu), export, as_json=as_json)
+                options.put(export(state, gpu).html, target, as_json=as_json)
             return
         server = Server(state, process, host=host, port=port)
         emit_json({"url": server.url}) if as_json else emit(server.url)

@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from html import escape
 from typing import Any
 
+from msgspec import Struct
+
 from rendergraph.errors import InputError, Problem
 from rendergraph.formatting import jsonable
 from rendergraph.session.gpu import Gpu
@@ -22,14 +24,25 @@ _EXPORT = re.compile(r"^export ((?:const|function|async function) ([\w$]+))", re
 _LIST = re.compile(r"^export \{ ([\w, ]+) \};$", re.MULTILINE)
 
 
-def export_page(state: ViewState, gpu: Gpu) -> str:
+class Exported(Struct, frozen=True):
+    """A static page, with what it shows: its picture as PNG, the description of its pipeline, size and times."""
+
+    html: str
+    picture: bytes
+    pipeline: Mapping[str, Any]
+    facts: Mapping[str, Any]
+
+
+def export(state: ViewState, gpu: Gpu) -> Exported:
+    """Render what a page shows, and return it as a static page."""
     service = RenderService(gpu)
     picture = _ask(service, state.request())
     state.record(picture)
     facts = dict(picture.facts)
+    pipeline = facts.pop("pipeline")
     messages = [
         _message("state", state.as_json()),
-        _message("pipeline", facts.pop("pipeline")),
+        _message("pipeline", pipeline),
         _message("picture", facts | {"frame": state.frame}, picture.files),
     ]
     if state.other is not None:
@@ -37,7 +50,7 @@ def export_page(state: ViewState, gpu: Gpu) -> str:
         messages.append(_message("against", against.facts, against.files))
     thumbnails = _ask(service, ThumbnailRequest())
     messages.append(_message("thumbnails", thumbnails.facts, thumbnails.files))
-    return _html(messages, str(picture.facts["pipeline"]["name"]))
+    return Exported(_html(messages, str(pipeline["name"])), picture.files["picture"], pipeline, facts)
 
 
 def _ask(service: RenderService, request: Request) -> Response:

@@ -22,6 +22,7 @@ QUICK = (*SMALL, "-s", "sun.resolution=128")
 ROUGH = (*QUICK, "-s", "environment.size=16")
 SMALLEST = {  # what is added to the examples of a verb: of options that are given twice the last one counts
     "run": (*ROUGH, "--executor", "serial"),  # compare/test_executors.py has the other executors
+    "gallery": ROUGH,
     "bench": (*ROUGH, "-n", "2"),
     "compare": (*QUICK, "-n", "1"),
     "sweep": (*ROUGH, "-n", "1", "--executor", "serial"),
@@ -436,3 +437,20 @@ def test_a_view_gives_what_is_not_chosen_otherwise(cli: Any, tmp_path: Path) -> 
     assert "RG500 there is no view 'sid'; did you mean 'side'?" in cli("run", "mine.yaml", "--view", "sid").err
     assert "RG500 there is no view 'sid'; the file has no views" in cli("run", "forward", "--view", "sid").err
     assert "RG012 '../x.hdr' lies outside" in cli("run", "mine.yaml", "--view", "out").err
+
+
+def test_a_site_of_pipelines_is_whole(cli: Any, tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").write_text("rendergraph: 1\nextends: forward\ndescription: <b>Mine</b> & yours\n")
+    (tmp_path / "wrong.yaml").write_text("rendergraph: 1\nextends: forward\nnodes: {light: {params: {ambiant: 1}}}\n")
+    result = cli("gallery", "forward", "mine.yaml", "-o", "site", "--title", "A & B", *ROUGH, "--json")
+    names = ["index.html", "forward.html", "forward.png", "mine.html", "mine.png"]
+    assert result.json["outputs"] == [f"site/{name}" for name in names]
+    index = (tmp_path / "site" / "index.html").read_text()
+    assert "<h1>A &amp; B</h1>" in index
+    assert "&lt;b&gt;Mine&lt;/b&gt; &amp; yours" in index
+    assert set(re.findall(r'(?:href|src)="([^"]+)"', index)) == set(names[1:])
+    assert images.read(tmp_path / "site" / "forward.png").shape[:2] == (36, 64)
+    broken = cli("gallery", "forward", "wrong.yaml", "-o", "other", *ROUGH)
+    assert broken.code == 3
+    assert not (tmp_path / "other").exists(), "mistakes are reported before anything is drawn"
+    assert "same name" in cli("gallery", "forward", "forward", "-o", "other").err

@@ -389,11 +389,11 @@ def test_it_comes_back_after_a_lost_render_process(page: Hand, served: Any) -> N
 
 
 def test_an_exported_page_is_whole_and_offline(hand: Hand, tmp_path: Path, gl: rg.Session) -> None:
-    from rendergraph.viewer.export import export_page
+    from rendergraph.viewer.export import export
     from rendergraph.viewer.view_state import ViewState
 
     file = tmp_path / "page.html"
-    file.write_text(export_page(ViewState(rg.Selection("deferred", size=SIZE), tmp_path), gl), encoding="utf-8")
+    file.write_text(export(ViewState(rg.Selection("deferred", size=SIZE), tmp_path), gl).html, encoding="utf-8")
     asked: list[str] = []
     hand.page.on("request", lambda request: asked.append(request.url))
     hand.page.context.set_offline(True)

@@ -1,0 +1,71 @@
+"""`rendergraph gallery`: a static site of pipelines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from rendergraph.cli import options
+from rendergraph.cli.lazy_click import click
+from rendergraph.cli.output import emit, emit_json
+from rendergraph.errors import Problem, UsageError
+
+
+@click.command("gallery", no_args_is_help=True)
+@click.argument("pipelines", nargs=-1, required=True, shell_complete=options.offered("pipelines"))
+@options.selection_options
+@click.option(
+    "-o",
+    "--output",
+    "folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    required=True,
+    help="Folder to write; it is made if it does not exist.",
+)
+@click.option("--title", default="Pipelines", show_default=True, help="Heading of the index.")
+@options.json_option
+@options.device_option
+def command(
+    pipelines: tuple[str, ...], select: options.Select, folder: Path, title: str, as_json: bool, device: int | None
+) -> None:
+    """Build a static site of pipelines.
+
+    Each pipeline gets the page that `view --export` writes, with its picture, graph, textures, parameters, memory and
+    times. `index.html` shows them all. The site needs no server and no network. Options apply to every pipeline.
+
+    \b
+    Examples:
+      rendergraph gallery forward deferred -o site --size 320x180
+      rendergraph gallery my.yaml -o site --title "My renderers"
+    """
+    from rendergraph.installed import require
+    from rendergraph.viewer import EXTRA
+
+    require(*EXTRA)
+    from rendergraph.images.files import write_file
+    from rendergraph.session.gpu import Gpu
+    from rendergraph.viewer.export import export
+    from rendergraph.viewer.site import Exhibit, index
+    from rendergraph.viewer.view_state import ViewState
+
+    selections = {Path(pipeline).stem: select(pipeline) for pipeline in pipelines}
+    if len(selections) < len(pipelines):
+        raise UsageError(Problem("RG500", "two of the pipelines have the same name; their pages would be one file"))
+    if "index" in selections:
+        raise UsageError(Problem("RG500", "a pipeline called 'index' would take the place of the site's index"))
+    for selection in selections.values():
+        options.linked(selection)  # the mistakes of all of them before the first is drawn
+    folder.mkdir(parents=True, exist_ok=True)
+    exhibits, written = [], list[str]()
+    with Gpu(device) as gpu:
+        for name, selection in selections.items():
+            page: Any = export(ViewState(selection, Path.cwd()), gpu)
+            files = {f"{name}.html": page.html, f"{name}.png": page.picture}
+            for file, content in files.items():
+                write_file(folder / file, content)
+            written += files
+            exhibits.append(Exhibit(name, f"{name}.html", f"{name}.png", page.pipeline, page.facts))
+    write_file(folder / "index.html", index(title, exhibits))
+    outputs = [str(folder / file) for file in ("index.html", *written)]
+    emit_json({"outputs": outputs}) if as_json else emit(outputs[0])
