@@ -52,7 +52,8 @@ function draw() {
     const { camera, frame, ...settings } = state.edits;  // a camera that moves leaves the fields alone
     const { scenes, environments } = state;
     showParameters($("parameters"), pipeline, node, settings, { scenes, environments });
-    showGraph($("canvas"), pipeline, { times, culled: pipeline.plan.culled, chosen: node, link: link?.words, wrong }, act);
+    const reused = new Set((picture?.passes ?? []).filter((pass) => !pass.ran).map((pass) => pass.node));
+    showGraph($("canvas"), pipeline, { times, reused, culled: pipeline.plan.culled, chosen: node, link: link?.words, wrong }, act);
     showEditor(pipeline, node, link);
     showLooking(pipeline, state);
     showMemory($("memory"), pipeline);

@@ -139,7 +139,7 @@ function card(node, box, why, act) {
 }
 
 // Put times, thumbnails and marks on the cards, where they have changed.
-function refresh({ cards, lines }, { times, culled, chosen, link, wrong }) {
+function refresh({ cards, lines }, { times, reused, culled, chosen, link, wrong }) {
   const all = Math.max(1e-9, Object.values(times).reduce((sum, one) => sum + one, 0));
   const put = (element, name, value) => { if (element.getAttribute(name) !== value) element.setAttribute(name, value); };
   for (const { node, group, bar, time, image, width } of cards) {
@@ -147,7 +147,7 @@ function refresh({ cards, lines }, { times, culled, chosen, link, wrong }) {
     put(group, "class", ["card", culled[id] !== undefined && "idle", chosen === id && "chosen", wrong.has(id) && "wrong"].filter(Boolean).join(" "));
     const ms = times[id];
     put(bar, "width", String(ms === undefined ? 0 : Math.max(1, (ms / all) * (width - 2))));
-    time.textContent = ms === undefined ? "" : `${short(Number(ms.toFixed(2)))} ms`;
+    time.textContent = ms === undefined ? "" : reused.has(id) ? "reused" : `${short(Number(ms.toFixed(2)))} ms`;
     const port = mainPort(node);
     if (port) put(image, "href", previews.get(`${id}.${port}`));
   }
