@@ -647,3 +647,17 @@ def test_hundreds_of_changes_leave_nothing_behind(show: Callable[..., Hand]) -> 
         swap(name)
     assert measure()[0] == elements
     assert measure()[1] < 1.3 * heap + 2e6
+
+
+@pytest.mark.nightly
+def test_a_sub_pipeline_is_one_card_until_it_is_opened(show: Callable[..., Hand]) -> None:
+    hand = show("ssgi-hemicube")
+    hand.page.wait_for_selector(".card[data-node=left]")
+    assert hand.page.locator(".card[data-node^='left/']").count() == 0
+    hand.page.focus("[aria-label='Open left']")
+    hand.page.keyboard.press("Enter")
+    hand.page.wait_for_selector(".card[data-node^='left/']")
+    assert hand.page.locator(".card[data-node=left]").count() == 0
+    hand.page.click("#fold")
+    hand.page.wait_for_selector(".card[data-node=left]")
+    assert hand.page.is_hidden("#fold")

@@ -1,6 +1,7 @@
 // The page: shows the state that comes from the server, and sends every action there as a message.
 import { $, choices, h, short } from "./dom.js";
 import { showEditor, showTypes, startEditor, takeAdded } from "./editor.js";
+import { fold, scopesOf } from "./fold.js";
 import { preview, reveal, showGraph, showPreviews, startGraph } from "./graph.js";
 import { showParameters, startParameters } from "./parameters.js";
 import { address, showComparison, showLooking, showPicture, showPixel, showSmall, showTexture, startPicture } from "./picture.js";
@@ -20,11 +21,13 @@ let saved = "";       // the name that was last saved under
 let draft = null;     // what saving would write, and the digest of what it replaces
 let still = false;  // an exported page renders nothing new
 let times = {};       // of the last still picture, by node
+const opened = new Set();  // the sub-pipelines that are open
 const history = [];
 const TABS = ["graph", "memory", "times", "changes"];
 
 const act = {
   node(id) { if (node !== id) $("right").scrollTop = 0; node = id; link = null; draw(); },
+  open(scope) { opened.add(scope); draw(); },
   link(found, words) { link = link?.words === words ? null : { ...found, words }; draw(); },
   enable(name) { send({ do: "set", path: `${name}.enabled`, value: true }); },
   port(name) {
@@ -40,7 +43,7 @@ function draw() {
     $("about").textContent = pipeline.description;
     document.title = `${pipeline.name} – rendergraph`;
     if (!pipeline.nodes[node]) node = "";
-    if (!pipeline.graph.links.some((one) => link?.words === `${one.source}.${one.source_port} → ${one.target}.${one.target_port}`)) link = null;
+    if (!pipeline.graph.links.some((one) => link && ["source", "source_port", "target", "target_port"].every((name) => one[name] === link[name]))) link = null;
     choices($("node"), ["", ...Object.keys(pipeline.nodes)], node, (id) => id || "the pipeline");
     choices($("camera"), ["", ...pipeline.cameras], state.moved ? "" : state.camera ?? pipeline.cameras[0], (name) => name || "moved by hand");
     const ports = pipeline.graph.nodes.flatMap((one) => Object.entries(one.outputs)
@@ -53,9 +56,10 @@ function draw() {
     const { scenes, environments } = state;
     showParameters($("parameters"), pipeline, node, settings, { scenes, environments });
     const reused = new Set((picture?.passes ?? []).filter((pass) => !pass.ran).map((pass) => pass.node));
-    showGraph($("canvas"), pipeline, { times, reused, culled: pipeline.plan.culled, chosen: node, link: link?.words, wrong }, act);
+    showGraph($("canvas"), { ...pipeline, graph: fold(pipeline.graph, opened) }, { times, reused, culled: pipeline.plan.culled, chosen: node, link: link?.words, wrong }, act);
     showEditor(pipeline, node, link);
     showLooking(pipeline, state);
+    $("fold").hidden = !opened.size;
     showMemory($("memory"), pipeline);
   }
   choices($("other"), ["", ...new Set([...state.others, ...state.pipelines])], state.other ?? "", (name) => name || "nothing");
@@ -206,7 +210,12 @@ function start() {
   });
   startLayout();
   startPicture();
-  startEditor((id) => { act.node(id); reveal($("canvas"), id); });
+  $("fold").onclick = () => { opened.clear(); draw(); };
+  startEditor((id) => {
+    for (const scope of scopesOf(id)) opened.add(scope);
+    act.node(id);
+    setTimeout(() => reveal($("canvas"), id), 300);  // the layout may be another
+  });
   startGraph($("canvas"), [[$("zoom-out"), 0.8], [$("zoom-in"), 1.25], [$("zoom-fit"), 0]]);
   startParameters($("parameters"));
   chooseTab("graph");

@@ -30,7 +30,8 @@ function computeLayout(graph) {
   return new Promise((resolve) => { waiting.set(id, resolve); });
 }
 
-const mainPort = (node) => Object.keys(node.outputs).find((name) => previews.has(`${node.id}.${name}`));
+const endOf = (node, name) => node.ends?.[name] ?? `${node.id}.${name}`;
+const mainPort = (node) => Object.keys(node.outputs).map((name) => endOf(node, name)).find((end) => previews.has(end));
 
 function shapeOf(node) {
   const rows = Object.keys(node.inputs).length + Object.keys(node.outputs).length;
@@ -109,30 +110,32 @@ const clip = (text, most) => (text.length > most ? `${text.slice(0, most - 1)}â€
 // The parts of a card that change with pictures are filled in by `refresh`.
 function card(node, box, why, act) {
   const inputs = Object.keys(node.inputs), outputs = Object.entries(node.outputs);
-  const title = why === undefined ? `${node.id}: ${node.type}` : `${node.id} does not run: ${why}`;
+  const choose = node.inner ? () => act.open(node.id) : () => act.node(node.id);
+  const pinOf = (...words) => (node.inner ? "" : pin(...words));  // what is inside is connected in its own file
+  const title = node.inner ? `${node.id}: a sub-pipeline of ${node.type}` : why === undefined ? `${node.id}: ${node.type}` : `${node.id} does not run: ${why}`;
   const bar = s("rect", { class: "time", x: 1, y: HEAD - 5, height: 3, width: 0 });
   const time = s("text", { x: box.width - 8, y: 16, "text-anchor": "end", class: "quiet" });
   const image = s("image", {
     x: 8, y: box.height - PICTURE - 4, width: box.width - 16, height: PICTURE, class: "port",
-    onclick: (event) => { event.stopPropagation(); act.port(`${node.id}.${mainPort(node)}`); },
+    onclick: (event) => { event.stopPropagation(); act.port(mainPort(node)); },
   });
   const group = s("g", {
     class: "card", transform: `translate(${box.x},${box.y})`, role: "group", "aria-label": title, "data-node": node.id,
-    onclick: () => act.node(node.id),
+    onclick: choose,
   }, s("title", {}, title), s("rect", { class: "box", width: box.width, height: box.height, rx: 6 }),
   s("rect", { x: 1, y: 8, width: 3, height: HEAD - 16, rx: 1, fill: familyColor(node.family) }),
-  s("g", button(`Choose ${node.id}`, () => act.node(node.id)), s("rect", { class: "head", width: box.width, height: HEAD - 5 }),
+  s("g", button(`${node.inner ? "Open" : "Choose"} ${node.id}`, choose), s("rect", { class: "head", width: box.width, height: HEAD - 5 }),
     s("text", { x: 8, y: 16, "font-weight": 600 }, clip(node.id, 18)), s("text", { x: 8, y: 31, class: "quiet" }, clip(node.type, 26))), bar, time);
   inputs.forEach((name, i) => {
     const y = HEAD + (i + 0.5) * ROW;
-    group.append(s("text", { x: 8, y: y + 4, class: "quiet" }, clip(name, 26)), pin("input", node.id, name, 0, y));
+    group.append(s("text", { x: 8, y: y + 4, class: "quiet" }, clip(name, 26)), pinOf("input", node.id, name, 0, y));
   });
   outputs.forEach(([name, output], i) => {
     const y = HEAD + (inputs.length + i + 0.5) * ROW + 4;
     group.append(s("g", {
-      class: "port", ...button(`Show ${node.id}.${name}`, () => act.port(`${node.id}.${name}`)),
+      class: "port", ...button(`Show ${endOf(node, name)}`, () => act.port(endOf(node, name))),
     }, s("title", {}, `${describeOutput(output)}${output.used ? "" : ", unused"}`),
-    s("text", { x: box.width - 8, y, "text-anchor": "end", class: output.used ? "" : "quiet" }, clip(name, 26))), pin("output", node.id, name, box.width, y - 4));
+    s("text", { x: box.width - 8, y, "text-anchor": "end", class: output.used ? "" : "quiet" }, clip(name, 26))), pinOf("output", node.id, name, box.width, y - 4));
   });
   group.append(image);
   return { node, group, bar, time, image, width: box.width };
@@ -144,12 +147,14 @@ function refresh({ cards, lines }, { times, reused, culled, chosen, link, wrong 
   const put = (element, name, value) => { if (element.getAttribute(name) !== value) element.setAttribute(name, value); };
   for (const { node, group, bar, time, image, width } of cards) {
     const { id } = node;
-    put(group, "class", ["card", culled[id] !== undefined && "idle", chosen === id && "chosen", wrong.has(id) && "wrong"].filter(Boolean).join(" "));
-    const ms = times[id];
+    const inner = (node.inner ?? [node]).map((one) => one.id);
+    put(group, "class", ["card", inner.every((one) => culled[one] !== undefined) && "idle", chosen === id && "chosen", inner.some((one) => wrong.has(one)) && "wrong"].filter(Boolean).join(" "));
+    const measured = inner.filter((one) => times[one] !== undefined);
+    const ms = measured.length ? measured.reduce((sum, one) => sum + times[one], 0) : undefined;
     put(bar, "width", String(ms === undefined ? 0 : Math.max(1, (ms / all) * (width - 2))));
-    time.textContent = ms === undefined ? "" : reused.has(id) ? "reused" : `${short(Number(ms.toFixed(2)))} ms`;
+    time.textContent = ms === undefined ? "" : measured.every((one) => reused.has(one)) ? "reused" : `${short(Number(ms.toFixed(2)))} ms`;
     const port = mainPort(node);
-    if (port) put(image, "href", previews.get(`${id}.${port}`));
+    if (port) put(image, "href", previews.get(port));
   }
   for (const { path, words } of lines) path.classList.toggle("chosen", link === words);
 }
@@ -199,10 +204,11 @@ function startDrag(container, event) {
 
 // The nodes whose cards are in sight.
 function nodesInSight(container) {
+  const inside = new Map((drawn?.cards ?? []).filter(({ node }) => node.inner).map(({ node }) => [node.id, node.inner.map(({ id }) => id)]));
   const [left, top] = [container.scrollLeft / scale, container.scrollTop / scale];
   const [right, bottom] = [left + container.clientWidth / scale, top + container.clientHeight / scale];
   return cached.layout.children.filter(({ x, y, width, height }) => x < right && x + width > left && y < bottom && y + height > top)
-    .map(({ id }) => id).filter((id) => !id.startsWith("disabled "));
+    .flatMap(({ id }) => inside.get(id) ?? [id]).filter((id) => !id.startsWith("disabled "));
 }
 
 // Ask for the thumbnails of what is in sight, once scrolling pauses.
@@ -335,7 +341,7 @@ function drawGraph(container, pipeline, facts, act) {
       const d = edgePath(section);
       const path = s("path", { class: classes.filter(Boolean).join(" "), d });
       lines.push({ path, words });
-      svg.append(path, s("path", { class: "hit", d, "data-link": words, onclick: () => act.link(link, words) },
+      svg.append(path, s("path", { class: "hit", d, "data-link": words, onclick: () => act.link(link.own ?? link, words) },
         s("title", {}, `${words}${output ? `: ${output.semantic}` : ""}`)));
     }
   });
