@@ -207,6 +207,7 @@ def test_what_is_played_goes_on_and_stops(served: Any) -> None:
 
 def test_a_variant_is_saved_where_view_was_started_and_never_over_another(served: Any) -> None:
     with served.tab() as tab:
+        tab.hear("pipeline")  # that of before
         tab.say(do="set", path="display.exposure", value=1)
         tab.hear("pipeline")
         tab.say(do="save", name="brighter.yaml")
@@ -352,3 +353,12 @@ def test_one_page_too_many_is_refused(limited: Any) -> None:
         tabs[0].say(do="pixel", x=0.5, y=0.5)
         tabs[0].hear("pixel")
     alive(limited)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost"])
+def test_messages_do_not_wait_for_each_other(host: str) -> None:
+    """The loop turns Nagle's algorithm off for connections that name their protocol; it delays a picture by 40 ms."""
+    from rendergraph.viewer.server import _bind  # needs the extra
+
+    with _bind(host, 0) as bound:
+        assert bound.proto == socket.IPPROTO_TCP
