@@ -251,7 +251,7 @@ ACTIONS: list[dict[str, Any]] = [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in range(3, 12))])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in range(2, 12))])
 def test_any_fifty_actions_saved_are_what_the_page_shows(gl: rg.Session, folder: Path, seed: int) -> None:
     """In place and as a variant; a step that does not link is undone, as a hand would."""
     choose = random.Random(seed)
