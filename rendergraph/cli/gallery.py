@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from rendergraph.cli import options
 from rendergraph.cli.lazy_click import click
@@ -45,8 +44,8 @@ def command(
     require(*EXTRA)
     from rendergraph.images.files import write_file
     from rendergraph.session.gpu import Gpu
-    from rendergraph.viewer.export import export
-    from rendergraph.viewer.site import Exhibit, index
+    from rendergraph.viewer.export import Exported, export
+    from rendergraph.viewer.site import index
     from rendergraph.viewer.view_state import ViewState
 
     selections = {Path(pipeline).stem: select(pipeline) for pipeline in pipelines}
@@ -57,15 +56,13 @@ def command(
     for selection in selections.values():
         options.linked(selection)  # the mistakes of all of them before the first is drawn
     folder.mkdir(parents=True, exist_ok=True)
-    exhibits, written = [], list[str]()
+    pages: dict[str, Exported] = {}
     with Gpu(device) as gpu:
         for name, selection in selections.items():
-            page: Any = export(ViewState(selection, Path.cwd()), gpu)
-            files = {f"{name}.html": page.html, f"{name}.png": page.picture}
-            for file, content in files.items():
-                write_file(folder / file, content)
-            written += files
-            exhibits.append(Exhibit(name, f"{name}.html", f"{name}.png", page.pipeline, page.facts))
-    write_file(folder / "index.html", index(title, exhibits))
-    outputs = [str(folder / file) for file in ("index.html", *written)]
+            pages[name] = page = export(ViewState(selection, Path.cwd()), gpu)
+            write_file(folder / f"{name}.html", page.html)
+            write_file(folder / f"{name}.png", page.picture)
+    write_file(folder / "index.html", index(title, pages))
+    files = ("index.html", *(f"{name}.{ending}" for name in pages for ending in ("html", "png")))
+    outputs = [str(folder / file) for file in files]
     emit_json({"outputs": outputs}) if as_json else emit(outputs[0])

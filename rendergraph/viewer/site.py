@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from html import escape
-from typing import Any
 
-from msgspec import Struct
+from rendergraph.viewer.export import Exported
 
 _STYLE = """:root { color-scheme: light dark; --page: #ffffff; --ink: #1f2328; --quiet: #57606a; --line: #d5dae0; }
 @media (prefers-color-scheme: dark) { :root { --page: #12161b; --ink: #e6edf3; --quiet: #9aa4af; --line: #333b45; } }
@@ -21,19 +20,9 @@ h1 { font-size: 22px; } h2 { font-size: 17px; margin: 10px 12px 2px; } p { margi
 """
 
 
-class Exhibit(Struct, frozen=True):
-    """A pipeline in the site: its page and picture by file name, and what the page shows (`describe`, and times)."""
-
-    name: str
-    page: str
-    picture: str
-    pipeline: Mapping[str, Any]
-    facts: Mapping[str, Any]
-
-
-def index(title: str, exhibits: Iterable[Exhibit]) -> str:
-    """Return the index of a site as HTML, which needs no script and no network."""
-    cards = "\n".join(_card(exhibit) for exhibit in exhibits)
+def index(title: str, pages: Mapping[str, Exported]) -> str:
+    """Return the index of a site as HTML; each page has its files under its name, as `NAME.html` and `NAME.png`."""
+    cards = "\n".join(_card(name, page) for name, page in pages.items())
     return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<style>\n{_STYLE}</style>\n</head>\n'
@@ -41,14 +30,14 @@ def index(title: str, exhibits: Iterable[Exhibit]) -> str:
     )
 
 
-def _card(exhibit: Exhibit) -> str:
-    pipeline, facts = exhibit.pipeline, exhibit.facts
+def _card(name: str, page: Exported) -> str:
+    pipeline, facts, name = page.pipeline, page.facts, escape(name)
     width, height = facts["size"]
     memory = pipeline["plan"]["memory"]["allocated_bytes"] / 2**20
     cost = f"{len(facts['passes'])} passes, {facts['frame_ms']:.1f} ms, {memory:.1f} MiB at {width}×{height}"
     software = " (software rasteriser)" if facts["device"]["software"] else ""
     return (
-        f'<li><a href="{escape(exhibit.page)}"><img src="{escape(exhibit.picture)}" width="{width}" height="{height}" '
-        f'alt="What {escape(exhibit.name)} draws">\n<h2>{escape(exhibit.name)}</h2>\n'
+        f'<li><a href="{name}.html"><img src="{name}.png" width="{width}" height="{height}" '
+        f'alt="What {name} draws">\n<h2>{name}</h2>\n'
         f'<p>{escape(str(pipeline["description"]))}</p>\n<p class="quiet">{cost}{software}</p></a></li>'
     )

@@ -120,7 +120,7 @@ function askDraft() {
 const quote = (word) => (/^[\w./=@+-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
 const flags = () => [...state.flags.map((flag) => `-s ${quote(flag)}`), ...(state.edits.frame ? [`--frames ${state.edits.frame}-${state.edits.frame}`] : [])].join(" ");
 
-on("state", (facts) => { state = facts; showFrame(facts.frame); showProblems(); draw(); askDraft(); });  // clears a refusal
+on("state", (facts) => { state = facts; showFrame(facts.frame); showProblems(); draw(); });  // clears a refusal
 on("pipeline", (facts) => {
   pipeline = facts;
   node = takeAdded(pipeline.nodes) || node;
@@ -140,6 +140,7 @@ on("picture", (facts, files) => {
   times = Object.fromEntries(facts.passes.map((pass) => [pass.node, pass.gpu_ms ?? pass.cpu_ms]));
   showTexture(facts.texture);
   draw();
+  askDraft();
 });
 on("thumbnails", (facts, files) => { showPreviews(files, address); draw(); });
 on("against", (facts, files) => { comparison = files.other ? facts : null; showComparison(facts, files); showFigures(); });

@@ -27,9 +27,9 @@ function fit(output, input) {
 }
 
 // The nodes that depend on a node, itself included.
-function readersOf(node) {
+export function readersOf(node, graph = pipeline.graph) {
   const found = new Set([node]);
-  const links = pipeline.graph.links.filter((link) => !link.previous);
+  const links = graph.links.filter((link) => !link.previous);
   for (const one of found) for (const link of links) if (link.source === one) found.add(link.target);
   return found;
 }
@@ -40,8 +40,6 @@ export function outputsFor(graph, input, without, called = "") {
     .map(([name, output]) => ({ end: `${node.id}.${name}`, rank: fit(output, input) && 2 * fit(output, input) + Number(name === called) })));
   return found.filter(({ rank }) => rank).reverse().sort((a, b) => b.rank - a.rank).map(({ end }) => end);
 }
-
-export const dependants = (graph, node) => { pipeline = { ...pipeline, graph }; return readersOf(node); };
 
 // The inputs of a node that may read an output, and the outputs that an input of another may read.
 const inputsFor = (node, end) => (readersOf(node).has(end.split(".")[0]) ? [] : Object.keys(pipeline.nodes[node].inputs)
@@ -180,19 +178,20 @@ function openPalette(title, choices) {
   search.focus();
 }
 
-// Nodes that need an output of a deleted one read its input of the same meaning instead.
+// What a node's output comes from, if one of its inputs means the same.
+function sourceOf(end) {
+  const { inputs } = pipeline.nodes[end.split(".")[0]];
+  return Object.values(inputs).find((input) => fit(outputOf(end), input) === 2 && input.links.length)?.links[0];
+}
+
+// What needs an output of a deleted node reads what that comes from instead.
 function deleteNode(node) {
-  const bypass = pipeline.graph.links.filter((link) => link.source === node && !link.previous).flatMap((link) => {
-    const about = inputOf(link.target, link.target_port);
-    const made = outputOf(`${node}.${link.source_port}`);
-    const name = Object.keys(pipeline.nodes[node].inputs).find((one) => fit(made, inputOf(node, one)) === 2 && inputOf(node, one).links.length);
-    return name && about && !about.optional ? [["connect", `${link.target}.${link.target_port}`, [inputOf(node, name).links[0]]]] : [];
-  });
-  const outputs = Object.entries(pipeline.graph.outputs).filter(([, end]) => end.split(".")[0] === node).flatMap(([output, end]) => {
-    const name = Object.keys(pipeline.nodes[node].inputs).find((one) => fit(outputOf(end), inputOf(node, one)) === 2 && inputOf(node, one).links.length);
-    return name ? [["connect", `outputs.${output}`, [inputOf(node, name).links[0]]]] : [];
-  });
-  edit(...bypass, ...outputs, ["delete", node]);
+  const links = pipeline.graph.links.filter((link) => link.source === node && !link.previous)
+    .filter((link) => inputOf(link.target, link.target_port)?.optional === false)
+    .map((link) => [`${link.target}.${link.target_port}`, `${node}.${link.source_port}`]);
+  const outputs = Object.entries(pipeline.graph.outputs).filter(([, end]) => end.split(".")[0] === node).map(([name, end]) => [`outputs.${name}`, end]);
+  const bypass = [...links, ...outputs].filter(([, end]) => sourceOf(end)).map(([reader, end]) => ["connect", reader, [sourceOf(end)]]);
+  edit(...bypass, ["delete", node]);
 }
 
 // What the copy continues is the original's, as no two may continue the same.

@@ -1,6 +1,6 @@
 // Input fields for a node, made from the declaration of its type.
 import { h } from "./dom.js";
-import { dependants, outputsFor } from "./editor.js";
+import { outputsFor, readersOf } from "./editor.js";
 import { send } from "./socket.js";
 
 let held = null;     // the setting that a slider or a colour picker is moving: all of that is one step of undo
@@ -142,7 +142,7 @@ function setting(path, label, about, edits) {
 function linkRow(graph, node, name, about, edits) {
   const path = `${node}.${name}`;
   const links = [editedValue(edits, path, about.links)].flat().filter(Boolean);
-  const words = [...new Set([...(about.optional || about.many ? [""] : []), ...links, ...outputsFor(graph, about, dependants(graph, node))])];
+  const words = [...new Set([...(about.optional || about.many ? [""] : []), ...links, ...outputsFor(graph, about, readersOf(node, graph))])];
   // An input for several links has a list for each, and one more to add another.
   const now = about.many ? [...links, ""] : [links[0] ?? ""];
   const lists = now.map((link, at) => {
