@@ -34,7 +34,8 @@ vec3 cosine_direction(vec3 normal, vec2 xi) {
 }
 
 // A distance in metres that float32 coordinates at a point, computed from a depth texture or interpolated, are off by
-// at most. Rays begin that far above their surface. `view_distance` is its distance from the viewer, in metres.
+// at most. Rays begin that far above their surface. `view_distance` is its distance from the viewer, in metres. In
+// pictures of few pixels a depth texture is off by more, as rasterisers snap vertices: see `snapped_by`.
 float ray_offset(vec3 position, float view_distance) {
     vec3 size = abs(position);
     return 1e-4 * max(max(size.x, size.y), max(size.z, abs(view_distance)));

@@ -41,7 +41,8 @@ void main() {
     vec3 geometric_normal = geometric_normal_at(texel, TEXEL_CENTER, position, window_depth);
     // At outlines the differences of depth are those of two surfaces.
     if (dot(geometric_normal, axis) < 0.25) geometric_normal = axis;
-    vec3 origin = position + geometric_normal * ray_offset(position, linear_depth(depth_views[0], window_depth));
+    float distance = linear_depth(depth_views[0], window_depth);
+    vec3 origin = position + geometric_normal * max(ray_offset(position, distance), snapped_by(distance));
     vec2 shift = random_shift(pixel, ANIMATED * frame_index);
     for (int i = FIRST_RAY; i < PAST_RAY; ++i) {
         vec3 ray = cosine_direction(axis, shifted_point(i, shift));

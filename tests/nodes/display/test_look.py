@@ -40,6 +40,11 @@ def display_colors(seed: int, count: int = 2048) -> Floats:
     return colors[None]
 
 
+def eight_bits(session: rg.Session) -> float:
+    """How far a value may lie from that of 8 bits: GPUs do not round exactly."""
+    return (0.55 if session.device.software else 0.6) / 255
+
+
 def through(session: rg.Session, colors: Floats, look: Path | str, *sets: str) -> Floats:
     """What a look makes of display colours, (1, n, 3) from 0 to 1; light is displayed as it is."""
     light = np.ones((*colors.shape[:2], 4), np.float32)
@@ -101,7 +106,7 @@ def test_tables_of_colors_are_interpolated_in_tetrahedra(session: rg.Session, tm
     (tmp_path / "random.cube").write_text(cube_text(table))
     colors = display_colors(3)
     found = through(session, colors, tmp_path / "random.cube")
-    np.testing.assert_allclose(found, tetrahedral(table, colors), atol=0.55 / 255)
+    np.testing.assert_allclose(found, tetrahedral(table, colors), atol=eight_bits(session))
     assert np.abs(found - trilinear(table, colors)).mean() > 5 / 255
 
 
@@ -127,7 +132,7 @@ def test_the_domain_of_a_table(session: rg.Session, tmp_path: Path) -> None:
     (tmp_path / "part.cube").write_text(cube_text(grid(SIDE), head=head))
     colors = display_colors(5)
     expected = np.clip((colors - (0.25, 0, 0)) / (0.5, 1, 2), 0, 1)
-    np.testing.assert_allclose(through(session, colors, tmp_path / "part.cube"), expected, atol=0.55 / 255)
+    np.testing.assert_allclose(through(session, colors, tmp_path / "part.cube"), expected, atol=eight_bits(session))
 
 
 @pytest.mark.parametrize("kind", ["3D", "1D"])
@@ -156,7 +161,7 @@ def test_other_files_of_opencolorio(session: rg.Session, tmp_path: Path) -> None
     )
     colors = display_colors(6)
     found = through(session, colors, tmp_path / "warm.cc")
-    np.testing.assert_allclose(found, colors * (0.9, 0.8, 0.5) + (0.1, 0, 0), atol=0.55 / 255)
+    np.testing.assert_allclose(found, colors * (0.9, 0.8, 0.5) + (0.1, 0, 0), atol=eight_bits(session))
 
 
 def test_looks_of_a_configuration_change_light(session: rg.Session, tmp_path: Path) -> None:

@@ -62,9 +62,12 @@ cameras: {main: {eye: [0.5, 2, 4.2], target: [0, 0.4, 0.2], fov_y_degrees: 42, n
 @pytest.mark.nightly(keep=3)
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
-def test_full_precision_draws_the_forward_picture(radiance: Any, steps_off: Any, scene: str) -> None:
+def test_full_precision_draws_the_forward_picture(
+    session: rg.Session, radiance: Any, steps_off: Any, scene: str
+) -> None:
     """Visibility from the pre-pass's depth is that of the G-buffer's, so that shadow edges are the same too."""
-    same(steps_off(radiance("deferred", scene, FULL), radiance("forward-prepass", scene)))
+    share = FEW if session.device.software else 2e-3  # GPUs fuse other terms: a pixel in a thousand is two steps off
+    same(steps_off(radiance("deferred", scene, FULL), radiance("forward-prepass", scene)), share)
 
 
 @pytest.mark.nightly(keep=3)

@@ -67,7 +67,7 @@ def test_the_sum_of_the_parts_is_the_radiance(session: rg.Session, pipeline: str
     assert (found["irradiance"].max() > 0.05) != unlit
     assert (reflected.max() > 0.01) != bool({*sets} & PLAIN)
     plain, _ = parts(session, pipeline, (), *sets)
-    np.testing.assert_array_equal(radiance, plain)
+    np.testing.assert_allclose(radiance, plain, rtol=0 if session.device.software else 1e-6)  # GPUs fuse other terms
 
 
 @pytest.mark.parametrize("pipeline", ["forward", "deferred"])
