@@ -27,6 +27,8 @@ from rendergraph.scene.model import Environment, Light, MadeImage, Vec3
 
 DEFAULT_SUN: Vec3 = (-0.5, -0.7, -0.4)
 DEFAULT_AZIMUTH = 140.0
+CLEAR_DAY = 1.8
+"""Turbidity at which the sky sheds a sixth of the light, and shadows are about twice as blue as what the sun reaches."""
 SUN_LUX = 3.0
 """Illuminance of a surface that faces a sun at least `_DIMS_BELOW` high: as much as from the key light."""
 OVERCAST_LUX = 2.4
@@ -49,7 +51,7 @@ class Sky(Struct, frozen=True):
     """
 
     to_sun: Vec3
-    turbidity: float = 1.3
+    turbidity: float = CLEAR_DAY
     overcast: float = 0.0
 
     @property
@@ -60,7 +62,7 @@ class Sky(Struct, frozen=True):
 
 def sky(name: str, directional: Vec3 | None, values: Mapping[str, Any]) -> Environment:
     """Return a sky; `directional` is the direction of the scene's first directional light, if it has one."""
-    made = Sky(_to_sun(values, directional), values.get("turbidity", 1.3), values.get("overcast", 0.0))
+    made = Sky(_to_sun(values, directional), values.get("turbidity", CLEAR_DAY), values.get("overcast", 0.0))
     sun = _sun(made) if directional is None else None
     return Environment(_image(name, made), SIZE, sun=sun)
 

@@ -271,7 +271,7 @@ ENVIRONMENT = Table(
         ),
         Key("place", row(number(-90, 90), number(-180, 180)), "With `time`: latitude and longitude.", unit="°"),
         Key("time", TIME, "With `place`: date and time for the sun, with its offset from UTC."),
-        Key("turbidity", number(1, 10), "With a sky: haze, from 1 for clean air.", 1.3),
+        Key("turbidity", number(1, 10), "With a sky: haze, from 1 for clean air.", 1.8),
         Key("overcast", number(0, 1), "With a sky: clouds, which hide the sun at 1.", 0.0),
         Key("ground", bool, "Puts a ground below the objects that shows the image and receives shadows.", False),
         Key(
