@@ -15,6 +15,9 @@ class GTAO(RefinedDirectionalSampling):
     view direction. Each has two horizons, and the light between them has a closed form. Where the picture shows all
     occluders, the result is that of ray tracing.
 
+    Occluders count in full up to the radius, where they end at once. A `falloff` lets them end gradually, which hides
+    where the radius ends on a large surface.
+
     Interreflection brightens corners. `albedo` approximates it by the paper's fit, for surroundings of this colour.
     """
 
@@ -25,6 +28,9 @@ class GTAO(RefinedDirectionalSampling):
         doc="Unit vector, the mean unoccluded direction, world space; 0 for background.",
     )
 
+    falloff: float = param(
+        default=0.0, min=0, max=1, doc="Share of the radius over which occluders count less and less towards its end."
+    )
     albedo: float = param(default=0.0, min=0, max=1, doc="Grey albedo of the surroundings; 0: they reflect no light.")
 
     def record(self, steps: Steps) -> None:

@@ -10,7 +10,8 @@
 #include "value.glsl"
 uniform sampler2D surfaces;
 uniform ivec2 screen_size;
-uniform float radius;  // metres
+uniform float radius;   // metres
+uniform float falloff;  // share of the radius over which surfaces occlude less and less
 out Value unfiltered;
 
 // The cosine of the horizon angle along a direction, at least `cos_lowest`.
@@ -31,7 +32,8 @@ float find_horizon(
         bool occludes = in_radius
             && is_above_tangent_plane(view, offset, surface.xyz, max(surface.w, sample_surface.w));
         float cos_sample = dot(offset, view_dir) / length(offset);
-        cos_horizon = occludes && cos_sample > cos_horizon ? cos_sample : cos_horizon;
+        float near = clamp((radius - sqrt(distance_squared)) / max(falloff * radius, 1e-12), 0.0, 1.0);
+        cos_horizon = occludes ? max(cos_horizon, mix(cos_lowest, cos_sample, near)) : cos_horizon;
     }
     return clamp(cos_horizon, -1.0, 1.0);
 }

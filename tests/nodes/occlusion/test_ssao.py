@@ -262,6 +262,22 @@ cameras: {main: {eye: [0, 4, 4], target: [0, 0, 0.6], fov_y_degrees: 40, near: 0
 """
 
 
+def test_with_a_falloff_occlusion_ends_gradually(occlusion: Occlusion) -> None:
+    """On a floor beside a wall: as dark in the corner, never darker, and without the slope at the radius's end."""
+    scene = CORNER.format(eye=4.0, target=0.8, lens="height: 3")
+    away = floor_distance(121, 4.0, 0.8, "height: 3")
+    sharp, soft = (
+        occlusion("gtao", scene, (121, 121), radius=1, samples=128, scale=1, falloff=falloff)[:, 60]
+        for falloff in (0, 0.6)
+    )
+    floor = away > 0.05
+    assert (soft >= sharp - 2e-3)[floor].all()
+    assert soft[floor & (away < 0.08)].max() < 0.65
+    outer = floor & (away > 0.5) & (away < 1.1)
+    assert sharp[outer].min() < soft[outer].min() - 0.02
+    np.testing.assert_allclose(soft[floor & (away > 0.9)], 1, atol=0.02)
+
+
 def test_discs_behind_discs_hide_nothing_more(occlusion: Occlusion) -> None:
     """Before a row of fences a floor sees the first alone: sin² of the elevation of its upper edge over two.
 
