@@ -34,7 +34,7 @@ class TracedReflections(Lighting, ReducedResolution):
     Each of `samples` rays leaves in a direction that the surface's GGX lobe reflects, chosen among the microfacet
     normals that the viewer sees (Heitz 2018). The surface that it meets is lit as a lighting node would light it: by
     one of the lights, chosen by its share, with a shadow ray, by the environment, and by its own emission. A ray that
-    meets nothing brings the light of the environment.
+    meets nothing brings the light of the environment. Glass that it meets passes light straight on, without refraction.
 
     Lighting nodes take `reflections` in place of the environment's specular light, by the confidence in alpha. This is
     1 up to a roughness of three quarters of `max_roughness`, where it begins to fall to 0; rougher surfaces have no

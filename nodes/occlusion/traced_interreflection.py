@@ -18,9 +18,10 @@ class TracedInterreflection(Interreflection):
     Each of `samples` cosine-weighted rays that meets a surface within `radius` brings the diffuse light that this
     surface emits and reflects. What it reflects comes from the lights, of which one is chosen for each ray and has a
     shadow ray, from the sky, by one more ray, and with more than one of the `bounces` from further surfaces. The sky is
-    the scene's environment, or the constant `sky`. Unlike the techniques of screen space it knows what lies outside the
-    picture and behind other surfaces. `diffuse`, the light in the picture, is read only with `reuse`, which takes the
-    light of surfaces that the picture shows from there, and saves their rays.
+    the scene's environment, or the constant `sky`. Glass passes light straight on, and a coat keeps some of it. Unlike
+    the techniques of screen space it knows what lies outside the picture and behind other surfaces. `diffuse`, the
+    light in the picture, is read only with `reuse`, which takes the light of surfaces that the picture shows from
+    there, and saves their rays.
 
     `animated` traces other rays in each frame, for a mean over frames; `denoise` filters a single one. At a reduced
     `scale` fewer pixels are traced, and the others interpolated. It is the twin of the techniques of interreflection,

@@ -28,7 +28,7 @@ from rendergraph.scene.model import Environment, Light, MadeImage, Vec3
 DEFAULT_SUN: Vec3 = (-0.5, -0.7, -0.4)
 DEFAULT_AZIMUTH = 140.0
 CLEAR_DAY = 1.8
-"""Turbidity at which the sky sheds a sixth of the light, and shadows are about twice as blue as what the sun reaches."""
+"""Turbidity at which the sky sheds a sixth of the light, and its shadows are about twice as blue as sunlight."""
 SUN_LUX = 3.0
 """Illuminance of a surface that faces a sun at least `_DIMS_BELOW` high: as much as from the key light."""
 OVERCAST_LUX = 2.4

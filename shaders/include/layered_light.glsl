@@ -21,7 +21,7 @@ ReflectedLight layered_light(Surface s, vec3 light_dir, ReflectedLight base) {
 #ifdef CLEARCOAT_LAYER
     float coat_NoL = max(dot(s.clearcoat_normal, light_dir), 0.0);
     float coat_NoV = max(dot(s.clearcoat_normal, s.view_dir), 1e-4);
-    float below = 1.0 - max(clearcoat_reflectance(s, coat_NoL), clearcoat_reflectance(s, coat_NoV));
+    float below = below_clearcoat(s, light_dir);
     float alpha = max(s.clearcoat_roughness * s.clearcoat_roughness, 0.001);
     float lobe = distribution_ggx(s.clearcoat_normal, half_vector, alpha) * visibility_smith(coat_NoL, coat_NoV, alpha);
     base.diffuse *= below;

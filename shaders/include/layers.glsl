@@ -44,7 +44,8 @@ void material_layers(inout Surface s, MaterialData m, LayerTexels texels, float 
     s.film_f0 = mix(s.f0, schlick_f0(film, NoV), s.iridescence);
 #endif
 #ifdef TRANSMISSION_LAYER
-#ifndef TRANSMITS  // without a picture of what is behind, the surface is blended over it, with all that it reflects
+#if !defined(TRANSMITS) && !defined(PASSES_LIGHT)  // nothing brings what is behind
+    // The surface is blended over what is behind it, with all that it reflects.
     float opacity = max(1.0 - s.transmission * (1.0 - fresnel_schlick(vec3(s.dielectric.r), 1.0, NoV).r), 1e-3);
     s.alpha *= opacity;
     s.diffuse /= opacity;
@@ -85,6 +86,12 @@ float below_sheen(Surface s, float albedo) {
 // Reflectance of the smooth coat, of ior 1.5, at this cosine.
 float clearcoat_reflectance(Surface s, float cosine) {
     return s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, clamp(cosine, 0.0, 1.0)).r;
+}
+
+// What the coat leaves of the light between the base and two directions, unit vectors.
+float below_clearcoat(Surface s, vec3 light_dir) {
+    float to_light = clearcoat_reflectance(s, dot(s.clearcoat_normal, light_dir));
+    return 1.0 - max(to_light, clearcoat_reflectance(s, dot(s.clearcoat_normal, s.view_dir)));
 }
 #endif
 #endif

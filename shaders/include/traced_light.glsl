@@ -1,18 +1,36 @@
 // Light on surfaces that rays have met. The step reads an input of `SceneData` with `rays=True`.
 #include <lights.glsl>
 #include <luminance.glsl>
+#include <passing_light.glsl>
 #include <ray_directions.glsl>
 #include <trace.glsl>
 
 // The surface that stops light along a ray, up to a distance in metres; false if there is none. Transparent surfaces
-// stop it with a chance of their opacity. `pixel` and `seed` decide by which random number.
-bool stopping_surface(vec3 origin, vec3 direction, float farthest, ivec2 pixel, int seed, out Hit hit, out Surface s) {
+// stop it with a chance of their opacity, and transmissive ones pass it straight on with a chance of what they transmit.
+// `throughput` is multiplied by what they leave over that chance. `pixel` and `seed` decide by which random number.
+bool stopping_surface(
+    vec3 origin, vec3 direction, float farthest, ivec2 pixel, int seed, inout vec3 throughput, out Hit hit,
+    out Surface s) {
     bool is_hit = nearest_hit(origin, direction, 0.0, farthest, hit);
-#ifdef SCENE_ANY_BLENDED
-    while (is_hit && scene_has(hit.instance, SCENE_BLENDED)
-            && random_shift(pixel, seed).x >= scene_alpha(hit.instance, hit.triangle, hit.barycentrics)) {
-        is_hit = nearest_hit(origin, direction, hit.distance, farthest, hit);
+#if defined(SCENE_ANY_BLENDED) || defined(SCENE_ANY_TRANSMISSION)
+    bool passes = is_hit;
+    while (passes) {
+        vec2 xi = random_shift(pixel, seed);
         seed = seed * 747796405 + 1;
+        passes = false;
+#ifdef SCENE_ANY_BLENDED
+        passes = scene_has(hit.instance, SCENE_BLENDED)
+            && xi.x >= scene_alpha(hit.instance, hit.triangle, hit.barycentrics);
+#endif
+#ifdef SCENE_ANY_TRANSMISSION
+        if (!passes && scene_has(hit.instance, SCENE_TRANSMITS)) {
+            vec3 passed = passing_light(hit);
+            float chance = clamp(luminance_of(passed), 0.0, 0.95);
+            passes = xi.y < chance;
+            throughput *= passes ? passed / chance : vec3(1.0 / (1.0 - chance));
+        }
+#endif
+        if (passes) passes = is_hit = nearest_hit(origin, direction, hit.distance, farthest, hit);
     }
 #endif
     // Without a branch, because a function that returns early is costly on processors that run pixels in lockstep.

@@ -1,5 +1,6 @@
 // Radiance in the specular lobe of the picture's surfaces, by rays in directions that the lobe reflects.
 #define SCENE_LAYERS
+#define PASSES_LIGHT
 #include <brdf.glsl>
 #include <brdf_table.glsl>
 #include <depth_surface.glsl>
@@ -27,14 +28,15 @@ float confidence_at(float roughness) {
 vec3 arriving_radiance(vec3 origin, vec3 direction, float angle, ivec2 pixel, int seed) {
     Hit hit;
     Surface s;
-    if (!stopping_surface(origin, direction, 1e30, pixel, seed, hit, s)) {
+    vec3 throughput = vec3(1.0);
+    if (!stopping_surface(origin, direction, 1e30, pixel, seed, throughput, hit, s)) {
 #ifdef HAS_ENVIRONMENT
-        return light_from(direction, -angle);
+        return throughput * light_from(direction, -angle);
 #else
-        return ambient;
+        return throughput * ambient;
 #endif
     }
-    if (s.lit == 0.0) return unlit_radiance(s);
+    if (s.lit == 0.0) return throughput * unlit_radiance(s);
     s.emissive = emitted_radiance(hit, s);
 #if defined(SCENE_ANY_SHADOW_CATCHER) && defined(HAS_ENVIRONMENT)
     if (scene_has(hit.instance, SCENE_SHADOW_CATCHER)) {
@@ -49,7 +51,7 @@ vec3 arriving_radiance(vec3 origin, vec3 direction, float angle, ivec2 pixel, in
     reflectance = layered_light(s, light_dir, reflectance);
 #endif
     ReflectedLight direct = ReflectedLight(reflectance.diffuse * irradiance, reflectance.specular * irradiance);
-    return radiance_of(s, direct, environment_lighting(s));
+    return throughput * radiance_of(s, direct, environment_lighting(s));
 }
 
 void main() {

@@ -1,7 +1,13 @@
 // Diffuse light from other surfaces, by rays. Each ray that meets a surface within the radius brings the diffuse light
 // that leaves it: emission, light of the lights, and light of the sky and of further bounces.
+#define SCENE_LAYERS
+#define PASSES_LIGHT
+#define DIFFUSE_LOBE 0
+#define DIFFUSE_LOBE_SHARED 1
+#undef SCENE_ANY_SHEEN  // darkens what is below it by a few percent, and would need a table
 #include <depth_surface.glsl>
 #include <frame.glsl>
+#include <layers.glsl>
 #include <traced_light.glsl>
 #include "surfaces.glsl"
 #include "outputs.glsl"
@@ -59,6 +65,15 @@ bool has_sky() {
 #endif
 }
 
+// What a coat leaves of diffuse light from this direction, and to the viewer.
+float below_coat(Surface s, vec3 light_dir) {
+#ifdef CLEARCOAT_LAYER
+    return below_clearcoat(s, light_dir);
+#else
+    return 1.0;
+#endif
+}
+
 // Diffuse radiance that arrives along a ray from a surface. w is 1 if it meets nothing within the radius of occlusion.
 vec4 arriving_light(vec3 origin, vec3 direction, ivec2 pixel, int seed) {
     vec4 light = vec4(0.0);
@@ -73,7 +88,7 @@ vec4 arriving_light(vec3 origin, vec3 direction, ivec2 pixel, int seed) {
         Hit hit;
         Surface s;
         ++seed;
-        if (!stopping_surface(origin, direction, farthest, pixel, seed, hit, s)) {
+        if (!stopping_surface(origin, direction, farthest, pixel, seed, throughput, hit, s)) {
             // The sky that the pixel itself sees is the light of the lighting node.
             if (bounce == 1) light.w = 1.0;
             else if (!is_sky_known) light.rgb += throughput * sky_radiance(direction);
@@ -93,11 +108,12 @@ vec4 arriving_light(vec3 origin, vec3 direction, ivec2 pixel, int seed) {
         if (!is_sky_known) {
             vec3 light_dir;
             vec3 irradiance = irradiance_from_one_light(s, origin, random_shift(pixel + 16384, seed).x, light_dir);
-            light.rgb += throughput * irradiance * (max(dot(s.normal, light_dir), 0.0) / PI);
+            light.rgb += throughput * irradiance * (max(dot(s.normal, light_dir), 0.0) * below_coat(s, light_dir) / PI);
         }
         if (throughput == vec3(0.0) || (bounce == BOUNCES && (is_sky_known || !has_sky()))) break;
         direction = cosine_direction(s.normal, random_shift(pixel + 32768, seed));
         if (dot(direction, s.geometric_normal) <= 0.0) break;
+        throughput *= below_coat(s, direction);
         farthest = 1e30;
     }
     return light;

@@ -6,7 +6,7 @@
 // Each invocation follows the paths of its pixel one after the other in a single loop: one step is one ray and its
 // shadow ray, so that neighbours that run in lockstep are busy although their paths have different lengths.
 #define SCENE_LAYERS
-#define TRANSMITS
+#define PASSES_LIGHT
 #include "path_steps.glsl"
 
 uniform sampler2D previous_mean;

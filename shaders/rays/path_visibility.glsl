@@ -1,4 +1,5 @@
 // Shadows of paths: what masks and transparent surfaces let through counts, too.
+#include <passing_light.glsl>
 #include <trace.glsl>
 
 // Fraction of light that a surface stops: all of it or none with an alpha mask, else as opaque as it is.
@@ -14,23 +15,6 @@ float opacity(int instance, int triangle, vec2 barycentrics) {
 #endif
     return opaque;
 }
-
-#ifdef TRANSMISSION_LAYER
-// Light that passes straight through a transmissive surface: all of it through a thin wall, and the root of this factor
-// through each of the two sides of a volume.
-vec3 passing_light(Hit hit) {
-    MaterialData m = materials[MATERIAL_INDEX(scene_instances[hit.instance].material)];
-    float factor = m.transmission.x * (1.0 - m.surface.x);
-#ifdef SCENE_TRANSMISSION_ARRAYS
-    ivec3 v = scene_triangle(hit.instance, hit.triangle);
-    vec4 texel;
-    SceneCoordinates c = scene_coordinates(v, scene_weights(hit.barycentrics));
-    if (scene_texel(hit.instance, TRANSMISSION_SLOT, SCENE_TRANSMISSION_ARRAYS, c, texel)) factor *= texel.r;
-#endif
-    vec3 passed = m.base_color.rgb * (factor * (1.0 - m.extra.x));
-    return m.transmission.y > 0.0 ? sqrt(passed) : passed;
-}
-#endif
 
 // Fraction of light that arrives from another point. Light that casts shadows (SCENE_CASTS_SHADOW in `wanted`) is that
 // of punctual lights, which no path finds that is refracted: it passes straight through what transmits light.

@@ -154,3 +154,25 @@ def test_a_reduced_scale_is_interpolated_and_samples_agree(session: rg.Session, 
         many_blocks, blocks = (each.reshape(6, 6, 8, 6, 3).mean(axis=(1, 3)) for each in (many, found))
         assert np.median(blocks / many_blocks) == pytest.approx(1, abs=0.05)
         assert np.quantile(np.abs(blocks / many_blocks - 1), 0.75) < 0.3
+
+
+def test_a_mirror_shows_what_is_behind_tinted_glass(session: rg.Session, tmp_path: Path) -> None:
+    """A glowing wall through a thin pane, in the mirror: 96 % of it, tinted, as `path_traced` finds it."""
+    (tmp_path / "pane.yaml").write_text("""scene: 1
+objects:
+  mirror: {shape: plane, size: [20, 20], rotate_degrees: [90, 0, 0], material: mirror}
+  pane: {shape: plane, size: [60, 60], rotate_degrees: [-90, 0, 0], at: [0, 0, 3], material: pane}
+  wall: {shape: plane, size: [90, 90], rotate_degrees: [-90, 0, 0], at: [0, 0, 5], material: glow}
+materials:
+  mirror: {base_color: [1, 1, 1], metallic: 1, roughness: 0}
+  pane: {base_color: [1, 0.5, 0.2], transmission: 1, roughness: 0, double_sided: true}
+  glow: {base_color: [0, 0, 0], roughness: 1, specular: 0, emissive: [2, 2, 2]}
+lights: {none: {type: directional, direction: [0, -1, 0], intensity: 0}}
+cameras: {main: {eye: [0, 0, 2], target: [0, 0, 0], fov_y_degrees: 30, near: 0.1, far: 40}}
+""")
+    file, dark = tmp_path / "pane.yaml", "light.ambient=0"
+    found = draw(session, file, "light.radiance", dark, "mirror.samples=256", patch=REFLECTIONS, size=(8, 8))
+    expected = 2 * 0.96 * np.array([1, 0.5, 0.2])
+    np.testing.assert_allclose(found[..., :3].mean(axis=(0, 1)), expected, rtol=0.02)
+    truth = draw(session, file, "light.radiance", dark, "light.samples=256", pipeline="path-traced", size=(8, 8))
+    np.testing.assert_allclose(truth[..., :3].mean(axis=(0, 1)), expected, rtol=0.05)

@@ -189,3 +189,28 @@ def test_a_filter_takes_noise_and_a_reduced_scale_is_interpolated(session: rg.Se
     assert np.abs(smooth - many).mean() < 0.7 * np.abs(raw - many).mean()
     for few in (raw, smooth, half):
         assert abs(few.mean() / many.mean() - 1) < 0.1
+
+
+def test_a_pane_tints_the_light_that_comes_through_it(session: rg.Session, tmp_path: Path) -> None:
+    """A floor under a glowing ceiling with a pane between them: 96 % of the light, tinted; a coat keeps some of it."""
+    file = tmp_path / "scene.yaml"
+    text = """scene: 1
+objects:
+  floor: {shape: plane, size: [4, 4]}
+  pane: {shape: plane, size: [900, 900], at: [0, 1, 0], material: pane}
+  ceiling: {shape: plane, size: [900, 900], rotate_degrees: [180, 0, 0], at: [0, 2, 0], material: glow}
+materials:
+  pane: {base_color: [1, 0.5, 0.2], transmission: 1, roughness: 0, double_sided: true}
+  glow: {base_color: [0, 0, 0], roughness: 1, emissive: [1, 1, 1], clearcoat: COAT}
+lights: {none: {type: directional, direction: [0, -1, 0], intensity: 0}}
+cameras: {main: {eye: [0, 0.9, 0.01], target: [0, 0, 0], fov_y_degrees: 60, near: 0.1, far: 40}}
+"""
+    means = {}
+    for coat in (0, 1):
+        file.write_text(text.replace("COAT", str(coat)))
+        found = draw(session, file, *DARK, "gi.samples=256", size=(8, 8), x="gi.indirect")["x"]
+        means[coat] = found.mean(axis=(0, 1))
+        np.testing.assert_allclose(means[coat] / means[coat][0], [1, 0.5, 0.2], rtol=0.03)
+    assert means[0][0] == pytest.approx(0.96, rel=0.02)
+    cosine = (np.arange(4096) + 0.5) / 4096  # what a coat of f0 0.04 lets out, cosine-weighted
+    assert means[1][0] / means[0][0] == pytest.approx((2 * cosine * 0.96 * (1 - (1 - cosine) ** 5)).mean(), rel=0.02)
