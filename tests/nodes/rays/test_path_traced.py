@@ -191,15 +191,13 @@ def layer_albedos(degrees: float) -> dict[str, float]:
     }
 
 
-@pytest.mark.parametrize(("samples", "error"), [(64, 0.02), pytest.param(2048, 0.004, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize(("samples", "error"), [(64, 0.02), pytest.param(16384, 0.003, marks=pytest.mark.nightly)])
 def test_every_layer_reflects_and_transmits_its_albedo(
     session: rg.Session, tmp_path: Path, samples: int, error: float
 ) -> None:
-    """A thin pane lets through what it does not reflect; sheen loses 0.3 % where its grazing light is limited to 1."""
-    found = furnace(session, tmp_path, {"background": 1}, 50, samples, LAYERS)
-    expected = layer_albedos(50)
-    assert {name: found[name] for name in ("coat", "cloth", "pane")} == pytest.approx(
-        {name: expected[name] for name in ("coat", "cloth", "pane")}, rel=error
+    """A thin pane lets through what it does not reflect, and a film on a perfect mirror reflects everything."""
+    assert furnace(session, tmp_path, {"background": 1}, 50, samples, LAYERS) == pytest.approx(
+        layer_albedos(50), rel=error
     )
 
 
@@ -572,5 +570,5 @@ def test_interreflection_is_that_of_the_reference(
     """The picture's mean and 99 % of its pixels lie within three standard errors; the reference has noise, too."""
     found, variance, expected = reference(session, shared, part, name, bounces, 24)
     own = np.sqrt(variance + (0.004 * expected) ** 2)
-    assert (np.abs(found - expected) < 3 * own).mean() > 0.985
+    assert (np.abs(found - expected) < 3 * own).mean() > 0.99
     assert abs((found - expected).mean()) < 3 * np.sqrt(variance.sum()) / variance.size + 2e-4 * expected.mean()
