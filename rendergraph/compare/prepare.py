@@ -533,9 +533,10 @@ def measured_at(pipeline: Pipeline, metric: str | None) -> Pipeline:
             )
         ) from None
     desc = graph.textures[graph.outputs[METRIC]].desc
-    if desc is None or desc.kind != "texture2d" or desc.samples > 1 or desc.format in _INTEGER_FORMATS:
-        what = "a buffer" if desc is None else f"{desc.kind} {desc.format}"
-        needed = "expected a 2D texture with one layer and one sample, not of an integer format"
+    kinds = ("texture2d", "texture2d_array")
+    if desc is None or desc.kind not in kinds or desc.samples > 1 or desc.format in _INTEGER_FORMATS:
+        what = "a buffer" if desc is None else f"{desc.kind} {desc.format}, samples: {desc.samples}"
+        needed = "expected a 2D texture or array of them, with one sample, not of an integer format"
         text = f"'{metric}' of pipeline '{graph.name}' is {what}; {needed}"
         raise InputError(Problem("RG523", text, place))
     return measured

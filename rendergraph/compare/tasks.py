@@ -215,7 +215,12 @@ class ReferenceTask(Task):
 def _reference(
     run: Run, arrays: Mapping[str, Pixels], encoding: Encoding, kind: Literal["variant", "pipeline"] = "variant"
 ) -> Reference:
-    return Reference(run.name, kind, arrays[run.output], encoding, run.output, arrays.get("radiance"))
+    return Reference(run.name, kind, _one_picture(arrays[run.output]), encoding, run.output, arrays.get("radiance"))
+
+
+def _one_picture(pixels: Pixels) -> Pixels:
+    """Return an array of layers as one picture, with the layers one below the other."""
+    return pixels if pixels.ndim == 3 else pixels.reshape(-1, *pixels.shape[-2:])
 
 
 def _rendered(
@@ -228,7 +233,7 @@ def _rendered(
     encode: bool = False,
     warnings: tuple[Problem, ...] = (),
 ) -> RenderedResult:
-    graph, pixels = planned.linked.graph, arrays[run.output]
+    graph, pixels = planned.linked.graph, _one_picture(arrays[run.output])
     errors, flip_map = measure_against(pixels, reference, run.name, planned.linked.catalog.extensions.metrics())
     measured = {
         "pixels": pixels,

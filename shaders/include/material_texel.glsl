@@ -2,15 +2,16 @@
 //
 // Anisotropic filters read along the longer axis of a pixel's footprint. Samplers allow a ratio of 8 (`gpu_scene.py`),
 // so a footprint of 8 images or more reads the coarsest mip level, which is a single texel. That is read here at once:
-// a software rasteriser visits every repetition of the image in the footprint, thousands of them near a horizon.
+// a software rasteriser visits every repetition of the image in the footprint, thousands of them near a horizon, and
+// any number beside a triangle, where coordinates are extrapolated. All four pixels of a quad take the same branch,
+// because `texture` computes the footprint from the coordinates of all of them.
 vec4 material_texel(sampler2D image, vec2 uv) {
-    int coarsest = textureQueryLevels(image) - 1;
-    vec2 size = vec2(textureSize(image, 0)), dx = dFdxCoarse(uv) * size, dy = dFdyCoarse(uv) * size;
-    float footprint = max(dot(dx, dx), dot(dy, dy)), limit = 8.0 * max(size.x, size.y);
-    bool is_far = coarsest > 0 && !(footprint < limit * limit);  // or not finite, beside a triangle
+    uv = clamp(uv, -65536.0, 65536.0);  // a number, too
+    vec2 size = vec2(textureSize(image, 0)), limit = 8.0 * max(size.x, size.y) / size;
+    vec2 longer = max(abs(dFdxCoarse(uv)), abs(dFdyCoarse(uv)));  // some drivers' are those of a row or a column
+    float far = any(greaterThan(longer, limit)) ? 1.0 : 0.0;
+    bool is_far = far + abs(dFdxFine(far)) + abs(dFdyFine(far)) > 0.0;
     vec4 texel = texture(image, is_far ? vec2(0.0) : uv);
-    if (is_far) {
-        texel = texelFetch(image, ivec2(0), coarsest);
-    }
+    if (is_far) texel = texelFetch(image, ivec2(0), textureQueryLevels(image) - 1);
     return texel;
 }

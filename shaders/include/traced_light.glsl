@@ -6,8 +6,8 @@
 #include <trace.glsl>
 
 // The surface that stops light along a ray, up to a distance in metres; false if there is none. Transparent surfaces
-// stop it with a chance of their opacity, and transmissive ones pass it straight on with a chance of what they transmit.
-// `throughput` is multiplied by what they leave over that chance. `pixel` and `seed` decide by which random number.
+// stop it with a chance of their opacity, and transmissive ones pass it straight on by chance. `throughput` is
+// multiplied by what they leave, over the chance. `pixel` and `seed` decide by which random number.
 bool stopping_surface(
     vec3 origin, vec3 direction, float farthest, ivec2 pixel, int seed, inout vec3 throughput, out Hit hit,
     out Surface s) {

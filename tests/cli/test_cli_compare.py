@@ -389,7 +389,7 @@ def test_settings_make_variants_of_one_pipeline(cli: Any) -> None:
         (["deferred", "--with", "shadows.taps=1"], 2, "RG500 --with makes variants of one pipeline"),
         (["--with", "taps"], 2, "'taps' is not PATH=VALUE"),
         (["deferred", "--metric", "ao.occlusion"], 3, "--metric ao.occlusion: RG109 in forward: there is no node 'ao'"),
-        (["deferred", "--metric", "sun.shadow_map"], 3, "--metric sun.shadow_map: RG523 "),
+        (["--with", "light.samples=4", "--metric", "light.radiance"], 3, "--metric light.radiance: RG523 "),
     ],
 )
 def test_variants_and_ports_that_cannot_be_are_told(cli: Any, words: list[str], code: int, message: str) -> None:
@@ -453,3 +453,9 @@ def test_a_sweep_keeps_typed_values_and_a_table(cli: Any, tmp_path: Path) -> Non
         assert json.loads(row["light.ambient"]) == line["settings"]["light.ambient"]
     assert (tmp_path / "out" / rows[0]["run"] / "metric.exr").is_file()
     assert cli("sweep", "ssao-hemisphere", *axes, *words, "--resume", "--json").json["resumed"] == 4
+
+
+def test_layers_of_an_array_are_measured_together(cli: Any) -> None:
+    """The shadow map of one light is an array of one layer."""
+    told = cli("compare", "forward", "deferred", *SMALL, "--metric", "sun.shadow_map", "-n", "1", "--json").json
+    assert [run["rmse"] for run in told["variants"]] == [0, 0]

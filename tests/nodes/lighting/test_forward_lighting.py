@@ -37,13 +37,14 @@ cameras: {main: {eye: [0, 1, 0], target: [0.3, 1, -1], fov_y_degrees: 40, far: 3
 """
 
 
-def test_a_texture_has_its_mean_colour_up_to_the_horizon(session: rg.Session, tmp_path: Path) -> None:
-    """A pixel sees thousands of repetitions there, each of which a software rasteriser would visit."""
+@pytest.mark.parametrize("pipeline", ["forward", "forward-msaa"])
+def test_a_texture_has_its_mean_colour_up_to_the_horizon(session: rg.Session, tmp_path: Path, pipeline: str) -> None:
+    """A pixel sees thousands of repetitions there, each of which a software rasteriser would visit, for minutes."""
     texels = np.random.default_rng(1).integers(0, 256, (16, 8, 3))
     texels[..., 0] = 255
     write(tmp_path / "chart.png", texels.astype(np.uint8))
     (tmp_path / "chart.yaml").write_text(HORIZON)
-    found = render(session, "forward", tmp_path / "chart.yaml", (33, 24), *BARE)
+    found = render(session, pipeline, tmp_path / "chart.yaml", (33, 24), *BARE)
     linear = np.where(texels <= 10, texels / 255 / 12.92, ((texels / 255 + 0.055) / 1.055) ** 2.4)
     np.testing.assert_allclose(found[12:14, :, :3], np.broadcast_to(linear.mean((0, 1)), (2, 33, 3)), atol=0.01)
     assert found[22:, :, 1].std() > 0.05  # near the viewer single texels are seen
