@@ -358,6 +358,13 @@ def test_every_page_of_the_gallery_has_a_picture() -> None:
 
 
 @pytest.mark.slow
+def test_every_exercise_has_its_answer() -> None:
+    for page in (DOCS / "gallery").glob("*.md"):
+        for part in re.findall(r"^## Exercises\n(.*?)(?=^## |\Z)", page.read_text(), re.S | re.M):
+            asked = re.split(r"(?m)^(?=\d+\. )", part)[1:]
+            assert [item for item in asked if "<summary>Answer</summary>" not in item] == [], page.name
+
+
 def test_names_for_node_authors_are_all_documented(generated: Path) -> None:
     import rendergraph.api
 
