@@ -76,7 +76,7 @@ Request = RenderRequest | ThumbnailRequest | PixelRequest | CompareRequest | Cha
 class Response:
     """The response: JSON values, encoded pictures, problems with their node; camera and scene's sphere of a picture."""
 
-    facts: Mapping[str, Any] = field(default_factory=dict)
+    facts: dict[str, Any] = field(default_factory=dict)
     files: Mapping[str, bytes] = field(default_factory=dict)
     problems: tuple[Mapping[str, Any], ...] = ()
     camera: Camera | None = None

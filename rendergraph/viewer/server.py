@@ -125,6 +125,8 @@ class Server:
         self._pages: set[Page] = set()
         self._wake = asyncio.Event()
         self._needs_picture = True
+        self._revision = 0  # of what is to be drawn: it counts the pictures that were asked for
+        self._shown = 0  # the revision of the picture that pages have
         self._details_of: RenderRequest | None = None  # a still picture whose comparison and thumbnails are missing
         self._has_problems = False  # the last picture failed, and pages know
         self._thumbnails_of: RenderRequest | None = None
@@ -203,7 +205,7 @@ class Server:
         page = Page(socket)
         for kind, message in self._last.items():
             page.put(kind, message)
-        page.put("state", _text("state", self._state.as_json()))
+        page.put("state", _text("state", self._state_facts()))
         self._pages.add(page)
         sending = asyncio.create_task(page.send_forever())
         try:
@@ -236,7 +238,11 @@ class Server:
         match message:
             case messages.PixelMessage():
                 request = messages.PixelRequest(_clamp(message.x), _clamp(message.y))
-                self._query(page, request, lambda found: page.put("pixel", _text("pixel", dict(found.facts))))
+                self._query(
+                    page,
+                    request,
+                    lambda found: page.put("pixel", _text("pixel", found.facts | {"revision": self._shown})),
+                )
             case messages.DraftMessage(name):
                 text, difference, digest = self._state.draft(name)
                 page.put("draft", _text("draft", {"name": name, "difference": difference, "digest": digest}))
@@ -271,8 +277,11 @@ class Server:
         self._judge_soon()
 
     def _send_state(self) -> None:
-        if _text("state", state := self._state.as_json()) != self._last.get("state"):
+        if _text("state", state := self._state_facts()) != self._last.get("state"):
             self._broadcast("state", state)
+
+    def _state_facts(self) -> dict[str, Any]:
+        return self._state.as_json() | {"revision": self._revision}
 
     def _judge_soon(self) -> None:
         """Say what is wrong with an edit at once, also while a picture is being drawn."""
@@ -294,6 +303,7 @@ class Server:
         self._wake.set()
 
     def _request_picture(self) -> None:
+        self._revision += 1
         self._needs_picture = True
         self._wake.set()
 
@@ -330,10 +340,11 @@ class Server:
 
     async def _render(self) -> None:
         """Show the current picture; after one that fails nothing is requested until something changes."""
-        begun, request = time.monotonic(), self._state.request()
+        begun, request, revision = time.monotonic(), self._state.request(), self._revision
         response = await self._ask(request)
         if response is None or response.problems:
             return
+        self._shown = revision
         self._show(response, request)
         if self._state.playing:
             await asyncio.sleep(max(0.0, 1.0 / self._state.fps - (time.monotonic() - begun)))
@@ -347,10 +358,10 @@ class Server:
         self._state.record(response)
         facts = dict(response.facts)
         if (pipeline := facts.pop("pipeline", None)) is not None:
-            self._broadcast("pipeline", pipeline | {"revision": self._state.revision})
+            self._broadcast("pipeline", pipeline | {"revision": self._shown})
         if self._has_problems and request.selection == self._state.selection:  # or they are of a newer edit
             self._show_problems([])
-        self._broadcast("picture", facts | {"frame": request.frame}, response.files)
+        self._broadcast("picture", facts | {"frame": request.frame, "revision": self._shown}, response.files)
 
     async def _render_details(self, request: RenderRequest) -> None:
         """Show the comparison and thumbnails of a still picture; a new request of a page comes first."""
@@ -359,8 +370,8 @@ class Server:
             return  # the work loop comes back here
         other = self._state.other
         if other is not None and (response := await self._ask(messages.CompareRequest(other))) is not None:
-            problems = {"problems": list(response.problems)}
-            self._broadcast("against", dict(response.facts) | problems, response.files)
+            more = {"problems": list(response.problems), "revision": self._shown}
+            self._broadcast("against", dict(response.facts) | more, response.files)
         elif other is None and "against" in self._last:
             self._broadcast("against", {}, {})
             del self._last["against"]
@@ -381,8 +392,9 @@ class Server:
         new = {name: data for name, data in response.files.items() if self._thumbnails.get(name) != data}
         self._thumbnails |= new
         if new:
-            self._broadcast("thumbnails", response.facts, new)
-            self._last["thumbnails"] = _pack("thumbnails", response.facts, self._thumbnails)
+            facts = response.facts | {"revision": self._shown}
+            self._broadcast("thumbnails", facts, new)
+            self._last["thumbnails"] = _pack("thumbnails", facts, self._thumbnails)
 
     def _show_problems(self, problems: Sequence[Mapping[str, Any]]) -> None:
         self._has_problems = bool(problems)

@@ -143,6 +143,24 @@ def test_two_pages_see_one_state(served: Any) -> None:
         one.hear("picture", port="", still=True)
 
 
+def test_what_belongs_to_a_picture_has_its_revision(served: Any) -> None:
+    """So the page shows no figure, comparison or value beside another picture, and says while one is being drawn."""
+    with served.tab() as tab:
+        before = tab.hear("picture", still=True)[0]["revision"]
+        tab.say(do="compare", name="forward-prepass")
+        against = tab.hear("against")[0]
+        assert against["revision"] >= before
+        tab.say(do="look", port="light.radiance")
+        asked = tab.hear("state", port="light.radiance")[0]["revision"]
+        assert asked > against["revision"]
+        assert tab.hear("picture", port="light.radiance", still=True)[0]["revision"] == asked
+        tab.say(do="pixel", x=0.5, y=0.5)
+        assert tab.hear("pixel")[0]["revision"] == asked
+        tab.say(do="look", port="")
+        tab.say(do="compare", name=None)
+        tab.hear("picture", port="", still=True)
+
+
 def test_a_drag_is_drawn_without_loss_at_its_end(served: Any) -> None:
     with served.tab() as tab:
         tab.hear("picture", still=True)

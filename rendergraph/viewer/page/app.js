@@ -84,6 +84,7 @@ function showFrame(number) {
 function showFigures() {
   if (!picture) return;
   const parts = [`${picture.size.join("×")}`, `${short(Number(picture.frame_ms.toFixed(2)))} ms per frame on ${picture.device.renderer}`];
+  if (picture.revision < state.revision && !problems.length) parts.push("drawing…");
   if (picture.device.software) parts.push("software rasteriser, not a GPU measurement");
   if (comparison?.figures) {
     const { rmse, psnr, ssim, flip } = comparison.figures;
@@ -143,8 +144,12 @@ on("picture", (facts, files) => {
   askDraft();
 });
 on("thumbnails", (facts, files) => { showPreviews(files, address); draw(); });
-on("against", (facts, files) => { comparison = files.other ? facts : null; showComparison(facts, files); showFigures(); });
-on("pixel", showPixel);
+on("against", (facts, files) => {
+  if (facts.revision !== undefined && facts.revision !== picture?.revision) return;  // of another picture
+  comparison = files.other ? facts : null; showComparison(facts, files);
+  showFigures();
+});
+on("pixel", (facts) => { if (facts.revision === picture?.revision) showPixel(facts); });
 on("problems", (facts) => { problems = facts.problems; showProblems(); draw(); });
 on("refused", (facts) => {
   if ($("saving").open) $("draft").textContent = facts.problems.map((problem) => problem.text).join("\n");
