@@ -17,7 +17,7 @@ test quick: export GALLIVM_PERF ?= nopt
 test quick nightly: export MALLOC_MMAP_THRESHOLD_ ?= 4194304
 test quick nightly: export MALLOC_ARENA_MAX ?= 2
 
-.PHONY: check nightly format lint types imports docs pages pictures proofs test quick clean
+.PHONY: check nightly format lint types imports docs pages pictures proofs gpu-times test quick clean
 
 check:
 	$(MAKE) --jobs=2 --output-sync --no-print-directory lint types imports pages
@@ -53,6 +53,10 @@ pictures:
 # Measure again how near the tests of the nodes come to what they allow, and write docs/proofs.md.
 proofs:
 	python docs/measure_proofs.py
+
+# Time every shipped pipeline, and write docs/gpu-times.md. For a machine with a GPU.
+gpu-times:
+	python docs/measure_times.py
 
 test:
 	pytest -n $(WORKERS) --dist loadgroup

@@ -11,6 +11,7 @@ import ctypes
 import os
 import struct
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import reduce
 from operator import and_
@@ -44,6 +45,7 @@ class MemoryBlock(Struct, eq=False):
 def make_blocks(device: Device, groups: Sequence[Sequence[TextureDesc]]) -> list[MemoryBlock]:
     """Return a block for each list of descriptions, as large as its largest texture is on this device."""
     blocks: list[MemoryBlock] = []
+    allocated: list[tuple[int, int]] = []  # bytes and file descriptors that are not imported yet
     if not groups:
         return blocks
     try:
@@ -51,10 +53,13 @@ def make_blocks(device: Device, groups: Sequence[Sequence[TextureDesc]]) -> list
             raise NoMemoryObjects("the driver has no GL_EXT_memory_object_fd")
         identity = (ctypes.c_ubyte * 16)()
         device.raw.glGetUnsignedBytei_vEXT(_DEVICE_UUID, 0, identity)
-        with open_vulkan(bytes(identity)) as vulkan:
-            for descs in groups:
-                blocks.append(_block(device, vulkan, descs))
+        with ThreadPoolExecutor(1) as pool:  # NVIDIA's Vulkan leaves its thread without a current OpenGL context
+            pool.submit(_allocate, bytes(identity), groups, allocated).result()
+        for descs in groups:
+            blocks.append(_block(device, descs, *allocated.pop(0)))
     except BaseException as error:
+        for _, descriptor in allocated:
+            os.close(descriptor)
         for block in blocks:
             block.release()
         if isinstance(error, NoMemoryObjects):
@@ -64,14 +69,21 @@ def make_blocks(device: Device, groups: Sequence[Sequence[TextureDesc]]) -> list
     return blocks
 
 
-def _block(device: Device, vulkan: Vulkan, descs: Sequence[TextureDesc]) -> MemoryBlock:
-    sizes, masks = zip(*map(vulkan.requirements, descs), strict=True)
-    types = reduce(and_, masks)
-    if not types:
-        raise NoMemoryObjects("no memory type fits all textures of a block")
+def _allocate(identity: bytes, groups: Sequence[Sequence[TextureDesc]], allocated: list[tuple[int, int]]) -> None:
+    """Append the bytes and the file descriptor of a block for each list of descriptions."""
+    with open_vulkan(identity) as vulkan:
+        for descs in groups:
+            sizes, masks = zip(*map(vulkan.requirements, descs), strict=True)
+            types = reduce(and_, masks)
+            if not types:
+                raise NoMemoryObjects("no memory type fits all textures of a block")
+            allocated.append((max(sizes), vulkan.export(max(sizes), types)))
+
+
+def _block(device: Device, descs: Sequence[TextureDesc], size: int, descriptor: int) -> MemoryBlock:
     block = MemoryBlock(device, device.raw.make("glCreateMemoryObjectsEXT"))
     try:  # the driver owns the descriptor from then on
-        device.raw.glImportMemoryFdEXT(block.glo, max(sizes), _HANDLE_TYPE_OPAQUE_FD, vulkan.export(max(sizes), types))
+        device.raw.glImportMemoryFdEXT(block.glo, size, _HANDLE_TYPE_OPAQUE_FD, descriptor)
         for desc in dict.fromkeys(descs):
             block.textures[desc] = textures.create(device, desc, "a texture of a block", memory=block.glo)
     except BaseException:

@@ -308,7 +308,7 @@ def test_signed_normalised_texels_keep_their_sign_and_16_bits(draw: Draw) -> Non
 
     shaders = {"signed.frag": "out vec4 color; void main() { color = vec4(-1.0, -0.3, 0.7, 2.0); }"}
     image = draw("nodes: {s: {type: signed}}\noutputs: {image: s.color}", Signed, shaders=shaders)["image"]
-    np.testing.assert_allclose(image[0, 0], [-1, -0.3, 0.7, 1], atol=0.5 / 32767 + 1e-7)
+    np.testing.assert_allclose(image[0, 0], [-1, -0.3, 0.7, 1], atol=1 / 32767 + 1e-7)  # GPUs may round either way
 
 
 class Levels(Node):
