@@ -358,6 +358,28 @@ def test_every_page_of_the_gallery_has_a_picture() -> None:
 
 
 @pytest.mark.slow
+def sentences(text: str) -> Iterator[str]:
+    """The sentences of a page's prose, with a word in place of each piece of code or formula."""
+    text = re.sub(r"```.*?```|\$\$.*?\$\$", "", text, flags=re.S)
+    for paragraph in re.split(r"\n\s*\n", text):
+        if paragraph.lstrip().startswith(("|", "#", "!")):
+            continue
+        for item in re.split(r"\n(?=\s*(?:[-*]|\d+\.) )", paragraph):
+            plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", " ".join(item.split()))
+            plain = re.sub(r"`[^`]*`|\$[^$]*\$", "Code", plain)
+            yield from re.split(r"(?<=[.!?])\s+", plain)
+
+
+def test_no_sentence_has_more_than_forty_words() -> None:
+    long = []
+    for page in (*DOCS.rglob("*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"):
+        if not {"generated", "_build"} & set(page.relative_to(ROOT).parts):
+            for sentence in sentences(page.read_text(encoding="utf-8")):
+                if len(re.findall(r"[A-Za-z0-9][\w'’.-]*", sentence)) > 40:
+                    long.append(f"{page.name}: {sentence}")
+    assert not long
+
+
 def test_every_exercise_has_its_answer() -> None:
     for page in (DOCS / "gallery").glob("*.md"):
         for part in re.findall(r"^## Exercises\n(.*?)(?=^## |\Z)", page.read_text(), re.S | re.M):
