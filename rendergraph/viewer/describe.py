@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
+from pathlib import Path
 from typing import Any
 
 from rendergraph.declare import FileContent, InOut, Input, Parameter
 from rendergraph.diagrams import graph_json, plan_json
+from rendergraph.document import Value
 from rendergraph.errors import InputError
 from rendergraph.link import Graph, GraphNode
 from rendergraph.read import entries
@@ -24,9 +26,11 @@ def describe(planned: Planned) -> dict[str, Any]:
     ends = [end for reader in graph.nodes for links in reader.inputs.values() for end in links]
     for end in (*ends, *graph.outputs.values()):
         read[end.node].add(end.port)
+    written = entries(spec.tree, "nodes")
     nodes = {
         node.id: {
             "type": node.type.name,
+            "base": _base(written[node.id], spec.path) if node.id in written else "",
             "doc": (node.type.cls.__doc__ or "").strip().partition("\n\n")[0].replace("\n", " "),
             **_types(linked, node, read[node.id], families.get(node.type.family, ())),
             "parameters": {
@@ -63,6 +67,18 @@ def describe(planned: Planned) -> dict[str, Any]:
         "moves": moves(linked.scene),
         "warnings": [problem.as_json() for problem in linked.warnings],
     }
+
+
+def _base(node: Value, own: Path | None) -> str:
+    """Return the name of the file that a node is inherited from; empty if the opened file or a setting changes it."""
+    leaves, files = [node], set[Path | None]()
+    while leaves:
+        value = leaves.pop()
+        below = list(value.mapping.values()) if isinstance(value.data, dict) else []
+        leaves += below
+        files |= set() if below else {value.source.path}
+    found = node.mapping["type"].source.path if "type" in node.mapping else None
+    return "" if found is None or files & {own, None} else found.stem
 
 
 def _types(linked: Linked, node: GraphNode, read: Set[str], family: Sequence[str]) -> dict[str, list[str]]:

@@ -661,3 +661,17 @@ def test_a_sub_pipeline_is_one_card_until_it_is_opened(show: Callable[..., Hand]
     hand.page.click("#fold")
     hand.page.wait_for_selector(".card[data-node=left]")
     assert hand.page.is_hidden("#fold")
+
+
+@pytest.mark.nightly
+def test_what_a_file_inherits_is_one_card_for_each_file(show: Callable[..., Hand]) -> None:
+    hand = show("full")
+    hand.page.wait_for_selector(".card[data-node=gbuffer]")
+    hand.page.click("#inherited")
+    hand.page.wait_for_selector(".card[data-node='from deferred']")
+    assert hand.page.locator(".card[data-node=gbuffer], .card[data-node=sun]").count() == 0
+    assert hand.page.locator(".card[data-node=light]").count() == 1  # which the file changes
+    hand.page.focus("[aria-label='Open from forward']")
+    hand.page.keyboard.press("Enter")
+    hand.page.wait_for_selector(".card[data-node=sun]")
+    assert hand.page.get_attribute("#inherited", "aria-pressed") == "false"

@@ -22,12 +22,17 @@ let draft = null;     // what saving would write, and the digest of what it repl
 let still = false;  // an exported page renders nothing new
 let times = {};       // of the last still picture, by node
 const opened = new Set();  // the sub-pipelines that are open
+let folds = false;         // what the file inherits is one card for each file
 const history = [];
 const TABS = ["graph", "memory", "times", "changes"];
 
 const act = {
   node(id) { if (node !== id) $("right").scrollTop = 0; node = id; link = null; draw(); },
-  open(scope) { opened.add(scope); draw(); },
+  open(scope) {
+    if (scope.startsWith("from ")) folds = false;
+    else opened.add(scope);
+    draw();
+  },
   link(found, words) { link = link?.words === words ? null : { ...found, words }; draw(); },
   enable(name) { send({ do: "set", path: `${name}.enabled`, value: true }); },
   port(name) {
@@ -55,8 +60,11 @@ function draw() {
     const { camera, frame, ...settings } = state.edits;  // a camera that moves leaves the fields alone
     const { scenes, environments } = state;
     showParameters($("parameters"), pipeline, node, settings, { scenes, environments });
+    const bases = Object.fromEntries(Object.entries(pipeline.nodes).filter(([, one]) => one.base).map(([id, one]) => [id, one.base]));
     const reused = new Set((picture?.passes ?? []).filter((pass) => !pass.ran).map((pass) => pass.node));
-    showGraph($("canvas"), { ...pipeline, graph: fold(pipeline.graph, opened) }, { times, reused, culled: pipeline.plan.culled, chosen: node, link: link?.words, wrong }, act);
+    showGraph($("canvas"), { ...pipeline, graph: fold(pipeline.graph, opened, folds ? bases : {}) }, { times, reused, culled: pipeline.plan.culled, chosen: node, link: link?.words, wrong }, act);
+    $("inherited").hidden = !Object.keys(bases).length;
+    $("inherited").setAttribute("aria-pressed", folds);
     showEditor(pipeline, node, link);
     showLooking(pipeline, state);
     $("fold").hidden = !opened.size;
@@ -216,9 +224,11 @@ function start() {
   });
   startLayout();
   startPicture();
+  $("inherited").onclick = () => { folds = !folds; draw(); };
   $("fold").onclick = () => { opened.clear(); draw(); };
   startEditor((id) => {
     for (const scope of scopesOf(id)) opened.add(scope);
+    folds = folds && !pipeline.nodes[id]?.base;
     act.node(id);
     setTimeout(() => reveal($("canvas"), id), 300);  // the layout may be another
   });

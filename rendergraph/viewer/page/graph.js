@@ -112,7 +112,7 @@ function card(node, box, why, act) {
   const inputs = Object.keys(node.inputs), outputs = Object.entries(node.outputs);
   const choose = node.inner ? () => act.open(node.id) : () => act.node(node.id);
   const pinOf = (...words) => (node.inner ? "" : pin(...words));  // what is inside is connected in its own file
-  const title = node.inner ? `${node.id}: a sub-pipeline of ${node.type}` : why === undefined ? `${node.id}: ${node.type}` : `${node.id} does not run: ${why}`;
+  const title = node.inner ? `${node.id}: ${node.type} in one card` : why === undefined ? `${node.id}: ${node.type}` : `${node.id} does not run: ${why}`;
   const bar = s("rect", { class: "time", x: 1, y: HEAD - 5, height: 3, width: 0 });
   const time = s("text", { x: box.width - 8, y: 16, "text-anchor": "end", class: "quiet" });
   const image = s("image", {
