@@ -19,7 +19,7 @@ export function fold(graph, opened, bases = {}) {
     else {
       const card = cards.get(id) ?? { id, inner: [], ends: {}, type: "", family: node.family, inputs: {}, outputs: {} };
       card.inner.push(node);
-      card.type = `${card.inner.length} nodes`;
+      card.type = card.inner.length === 1 ? "1 node" : `${card.inner.length} nodes`;
       cards.set(id, card);
     }
   }
