@@ -188,5 +188,5 @@ def test_every_shipped_pipeline_is_drawn_as_alone(gl: rg.Session, name: str) -> 
     drawn = [arrays for _, arrays in render_batch(gl, batch, 2)]
     assert batch.pass_count <= len(passes(base.plan())) + 1
     for arrays, variant in zip(drawn, variants, strict=True):
-        for output, pixels in gl.render(variant, frames=range(1, 3)).items():
+        for output, pixels in gl.render(variant, frames=range(1, 3)).arrays.items():
             np.testing.assert_array_equal(arrays[output], pixels)
