@@ -76,7 +76,8 @@ def _base(node: Value, own: Path | None) -> str:
         value = leaves.pop()
         below = list(value.mapping.values()) if isinstance(value.data, dict) else []
         leaves += below
-        files |= set() if below else {value.source.path}
+        if not below:
+            files.add(value.source.path)
     found = node.mapping["type"].source.path if "type" in node.mapping else None
     return "" if found is None or files & {own, None} else found.stem
 

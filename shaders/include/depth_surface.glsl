@@ -62,10 +62,15 @@ vec3 geometric_normal_at(ivec2 texel, int sample_index, vec3 position, float win
     return normal * inversesqrt(max(dot(normal, normal), 1e-37));
 }
 
+// The height of a pixel, in metres, at `view_distance` metres from the viewer along the view axis.
+float pixel_height(float view_distance) {
+    float projected = depth_views[0].projection[2][3] == 0.0 ? 1.0 : abs(view_distance);
+    return 2.0 * projected / (depth_views[0].projection[1][1] * depth_views[0].viewport.y);
+}
+
 // A distance in metres that a position from depth lies above or below its surface at most, at `view_distance` metres
 // from the viewer. Rasterisers snap vertices to 1/256 of a pixel, which moves the surface by as much of a pixel's
 // height. That counts in pictures of few pixels.
 float snapped_by(float view_distance) {
-    float projected = depth_views[0].projection[2][3] == 0.0 ? 1.0 : abs(view_distance);
-    return 2.0 * projected / (depth_views[0].projection[1][1] * depth_views[0].viewport.y) / 256.0;
+    return pixel_height(view_distance) / 256.0;
 }

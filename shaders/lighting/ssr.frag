@@ -48,8 +48,8 @@ void main() {
     vec3 n = to_view * normalize(texelFetch(normal, texel, 0).xyz);
     vec3 position = (v.view * vec4(world, 1.0)).xyz, to_viewer = to_view * view_dir(v, world);
     vec3 ray = reflect(-to_viewer, n);
-    float distance = -position.z, pixel = 2.0 / (v.projection[1][1] * v.viewport.y);  // a pixel's height, 1 m away
-    vec3 start = position + n * (2.0 * pixel * distance);
+    float distance = -position.z;
+    vec3 start = position + n * (2.0 * pixel_height(distance));
     // The ray ends before the near plane.
     float travel = ray.z > 0.0 ? min(reach, 0.95 * (distance - v.range.x) / ray.z) : reach;
     vec3 end = start + ray * max(travel, 0.0);
@@ -85,7 +85,7 @@ void main() {
     vec3 other = to_view * texelFetch(normal, there, 0).xyz;
     if (dot(other, ray) > 0.0) return;  // the back of a surface is not in the picture
 
-    float length_met = length(met - position), cone = roughness * roughness * length_met / (pixel * found);
+    float length_met = length(met - position), cone = roughness * roughness * length_met / pixel_height(found);
     vec3 reflected = textureLod(lit, at.xy, log2(max(cone, 1.0))).rgb;
     vec2 edge = min(at.xy, 1.0 - at.xy) / max(fade, 1e-6);
     float confidence = clamp(min(edge.x, edge.y), 0.0, 1.0);

@@ -34,7 +34,8 @@ IDENTICAL = {"zeros", "bare"}
 TIGHT, VISIBLE = 1e-4, 1.01 / 255
 TOLERANCES = {
     "depth": (1e-6, 0.0),
-    "shadow_map": (TIGHT, 1e-4),  # a texel on an outline may be beside it
+    "shadow_map": (TIGHT, 0.0),
+    "shading-pbr shadow_map": (TIGHT, 1e-4),  # a texel on an outline, without AVX
     "velocity": (1e-5, 0.0),
     "visibility": (VISIBLE, 0.005),  # a point on a shadow's edge may be on either side
     "occlusion": (VISIBLE, 0.005),

@@ -154,7 +154,8 @@ on("picture", (facts, files) => {
 on("thumbnails", (facts, files) => { showPreviews(files, address); draw(); });
 on("against", (facts, files) => {
   if (facts.revision !== undefined && facts.revision !== picture?.revision) return;  // of another picture
-  comparison = files.other ? facts : null; showComparison(facts, files);
+  comparison = files.other ? facts : null;
+  showComparison(facts, files);
   showFigures();
 });
 on("pixel", (facts) => { if (facts.revision === picture?.revision) showPixel(facts); });

@@ -1,16 +1,13 @@
 // Sub-pipelines in the graph: each is one card until it is opened. So is what a file inherits, where that is asked for.
 const scopeOf = (id) => (id.includes("/") ? id.slice(0, id.lastIndexOf("/")) : "");
 
-// The card of the nodes that are inherited from a file.
-export const cardOf = (base) => `from ${base}`;
-
 // The graph with one card for each sub-pipeline that is not opened, and for each of the `bases`: files by the nodes that
 // are inherited from them. Its ports are those that lead out of it.
 export function fold(graph, opened, bases = {}) {
   const outer = (id) => {  // the outermost closed sub-pipeline of a node, or the node itself
     const parts = scopeOf(id).split("/").filter(Boolean);
     const scope = parts.map((_, i) => parts.slice(0, i + 1).join("/")).find((one) => !opened.has(one));
-    return bases[id] ? cardOf(bases[id]) : scope ?? id;
+    return bases[id] ? `from ${bases[id]}` : scope ?? id;
   };
   const cards = new Map();
   for (const node of graph.nodes) {
