@@ -18,6 +18,7 @@ from rendergraph.compile.checks import uniform_mismatch
 from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES
 from rendergraph.compile.memory import Call
 from rendergraph.compile.reuse import Reuse, Source
+from rendergraph.compile.scene_buffers import TEXELS
 from rendergraph.expand import CAMERA
 from rendergraph.gl.programs import Program
 from rendergraph.gl.state import Pieces, changes
@@ -43,7 +44,7 @@ _MOST_PARTS = 64
 
 
 _OF_INSTANCES = {
-    **dict.fromkeys(("scene_instance_block", "scene_vertex_block"), "instances"),
+    "scene_instance_block": "instances",
     **dict.fromkeys(("scene_previous_block", "scene_previous_position_block"), "instances before"),
 }
 """Blocks of the scene's data that change with other sources."""
@@ -394,7 +395,7 @@ class Executable(Struct, eq=False, dict=True):
             sources |= {("step", step.key), *(("buffer", id) for id in touched_ids(step))}
             if step.kind == "geometry":
                 sources |= {"instances", ("view", step.view or "")}
-            if any("scene_tree" in draw.program.uniforms for draw in compiled.all_draws):
+            if any(TEXELS & draw.program.uniforms.keys() for draw in compiled.all_draws):
                 sources.add("instances")
             if any(name in draw.program.object for draw in compiled.all_draws for name in PREVIOUS_ATTRIBUTES):
                 sources.add("instances before")

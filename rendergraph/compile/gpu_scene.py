@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from rendergraph.compile.culling import commands
 from rendergraph.compile.programs import ProgramCache
-from rendergraph.compile.scene_buffers import SceneBuffers, check_size
+from rendergraph.compile.scene_buffers import INSTANCES, TREE, VERTICES, SceneBuffers, check_size
 from rendergraph.expand import SCENE_DATA
 from rendergraph.gl import textures
 from rendergraph.gl.device import Device
@@ -65,7 +65,6 @@ SCENE_ATTRIBUTES = {
 """What a vertex shader that draws the scene may read, with moderngl's formats."""
 _SECTIONS = {"objects": "instances", "materials": "material_block", "lights": "light_block"}
 """Sections of scene files with what changes where values of plugins' keys change."""
-_TEXTURE_BUFFER, _RGBA32I = 0x8C2A, 0x8D82
 _MOST_RUNS = 32  # of neighbouring records that are uploaded one by one; what lies between them goes along beyond
 _PADDING = {"4f": "16x", "2i": "8x"}
 
@@ -173,7 +172,7 @@ class GpuScene(Struct, eq=False, dict=True):
                 self.changes["instances"] += 1
                 if self._data is not None:
                     place_instances(self._data.instances, scene, packed, moved)
-                    write_records(self._data.buffers["scene_instance_block"], self._data.instances, moved)
+                    write_records(self._data.buffers[INSTANCES], self._data.instances, moved)
                 if self._tree is not None:
                     trees, buffer = self._tree
                     trees = self._mesh_trees() if has_posed else trees
@@ -208,23 +207,26 @@ class GpuScene(Struct, eq=False, dict=True):
             indices = self._indices["triangles"].buffer
             self._data = SceneBuffers.make(self.device, self.scene, self.packed, indices, images)
             if self._posing is not None:
-                vertices = self._data.buffers["scene_vertex_block"]
+                vertices = self._data.buffers[VERTICES]
                 self._posing.fill(vertices, vertices.size // (4 * len(self.packed.positions)))
         return self._data
 
-    def tree(self) -> tuple[moderngl.Buffer, int]:
-        """The trees for `trace.glsl` and the GL texture that fetches from them, built when a program first looks.
+    def texels(self, name: str) -> int:
+        """The GL texture of a buffer that shaders fetch as texels."""
+        if name != TREE:
+            return self.data.texels[name]
+        self.tree()
+        return self._tree_texture
 
-        Software rasterisers fetch texels in a third of the time that elements of a storage block take them.
-        """
+    def tree(self) -> moderngl.Buffer:
+        """The trees for `trace.glsl`, built when a program first looks."""
         if self._tree is None:
             trees = self._mesh_trees()
             rows = object_rows(self.packed, self.data.instances["flags"], trees)
-            check_size(self.device, "scene_tree", rows.nbytes + trees.rows.nbytes, texel=16)
+            check_size(self.device, TREE, rows.nbytes + trees.rows.nbytes, texel=16)
             self._tree = trees, self.device.ctx.buffer(rows.tobytes() + trees.rows.tobytes())
-            self._tree_texture = self.device.raw.make("glCreateTextures", _TEXTURE_BUFFER)
-            self.device.raw.glTextureBuffer(self._tree_texture, _RGBA32I, self._tree[1].glo)
-        return self._tree[1], self._tree_texture
+            self._tree_texture = textures.create_texel_buffer(self.device, self._tree[1].glo, "rgba32i")
+        return self._tree[1]
 
     def _mesh_trees(self) -> MeshTrees:
         posing = self._posing

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import moderngl
-import numpy as np
-import numpy.typing as npt
 from msgspec import Struct
 
 from rendergraph.errors import Problem, RenderError
@@ -22,12 +20,18 @@ from rendergraph.textures import Sampler
 ARRAY = "scene_array_"
 """The beginning of the arrays' names in `scene.glsl`."""
 
+VERTICES, INSTANCES, TREE = "scene_vertex_texels", "scene_instance_block", "scene_tree"
+_INSTANCE_TEXELS = "scene_instance_texels"
+TEXELS = frozenset({VERTICES, _INSTANCE_TEXELS, TREE})
+"""Buffers that `scene.glsl` and `trace_tree.glsl` fetch as texels."""
+
 
 class SceneBuffers(Struct, eq=False):
     """The scene's data on the GPU.
 
     Attributes:
-        buffers: storage buffers by the names of their blocks in `scene.glsl`; the indices are those of geometry passes.
+        buffers: the buffers by their names in `scene.glsl`; the indices are those of geometry passes.
+        texels: textures that fetch from them, by name.
         instances: the records that the instance buffer holds.
         arrays: where textures lie.
         textures: texture arrays by their names in `scene.glsl`; they all have one `sampler`.
@@ -35,6 +39,7 @@ class SceneBuffers(Struct, eq=False):
 
     device: Device
     buffers: dict[str, moderngl.Buffer]
+    texels: dict[str, int]
     instances: Records
     arrays: TextureArrays
     textures: dict[str, GpuTexture]
@@ -53,16 +58,18 @@ class SceneBuffers(Struct, eq=False):
         instances = scene_data.instance_data(scene, packed)
         found = scene_data.texture_arrays({key: image.desc for key, image in images.items()})
         sizes = {key: image.desc.size for key, image in images.items()}
-        arrays: dict[str, npt.NDArray[np.generic]] = {
-            "scene_vertex_block": scene_data.vertex_data(packed),
-            "scene_instance_block": instances,
-            "scene_emitter_block": scene_data.emitter_data(scene, packed),
+        contents = {
+            VERTICES: scene_data.vertex_data(packed).tobytes(),
+            INSTANCES: instances.tobytes() + (scene_data.texture_data(scene, sizes, found).tobytes() if sizes else b""),
+            "scene_emitter_block": scene_data.emitter_data(scene, packed).tobytes(),
         }
-        if found.arrays:
-            arrays["scene_texture_block"] = scene_data.texture_data(scene, sizes, found)
-        for name, array in arrays.items():
-            check_size(device, name, array.nbytes)
-        buffers = {name: device.ctx.buffer(array.tobytes() or bytes(128)) for name, array in arrays.items()}
+        for name, content in contents.items():
+            check_size(device, name, len(content), texel=16 * (name in (VERTICES, INSTANCES)))
+        buffers = {name: device.ctx.buffer(content or bytes(128)) for name, content in contents.items()}
+        texels = {
+            VERTICES: textures.create_texel_buffer(device, buffers[VERTICES].glo, "rgba32f"),
+            _INSTANCE_TEXELS: textures.create_texel_buffer(device, buffers[INSTANCES].glo, "rgba32i"),
+        }
         buffers["scene_index_block"] = indices
         made = {
             f"{ARRAY}{number}": textures.create(device, desc, "an array of the scene's textures")
@@ -70,12 +77,14 @@ class SceneBuffers(Struct, eq=False):
         }
         for key, (number, layer) in found.places.items():
             _copy_with_border(device, images[key], made[f"{ARRAY}{number}"], layer, key)
-        return cls(device, buffers, instances, found, made, textures.create_sampler(device, Sampler("linear")))
+        return cls(device, buffers, texels, instances, found, made, textures.create_sampler(device, Sampler("linear")))
 
     def release(self) -> None:
         for name, buffer in self.buffers.items():
             if name != "scene_index_block":
                 buffer.release()
+        for texel in self.texels.values():
+            self.device.raw.delete("glDeleteTextures", texel)
         for texture in self.textures.values():
             textures.delete(self.device, texture)
         self.device.raw.delete("glDeleteSamplers", self.sampler)

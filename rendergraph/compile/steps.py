@@ -20,6 +20,7 @@ from rendergraph.compile.geometry import GeometryCompiler, MultiDraw
 from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES, SCENE_ATTRIBUTES, GpuScene
 from rendergraph.compile.memory import Call, Memory, Region, TexturePool, clear_target
 from rendergraph.compile.programs import ProgramCache
+from rendergraph.compile.scene_buffers import TEXELS
 from rendergraph.compile.transfers import clear_buffer, image_calls, transfer_calls
 from rendergraph.compile.units import Units
 from rendergraph.compile.uploads import UploadedValues
@@ -397,10 +398,10 @@ class _Compiler(Struct, eq=False, dict=True):
             sampled.add(name)
             if name in program.uniforms:
                 uniforms[name] = self.units.unit((texture.glo,), self.scene.data.sampler, binds)
-        if "scene_tree" in program.uniforms:
+        for name in sorted(TEXELS & program.uniforms.keys()):
             check_scene_includes(step, texts(), self.types)
-            sampled.add("scene_tree")
-            uniforms["scene_tree"] = self.units.unit((self.scene.tree()[1],), 0, binds)
+            sampled.add(name)
+            uniforms[name] = self.units.unit((self.scene.texels(name),), 0, binds)
         cls, resources, sampled = self.types[step.node].cls, self.plan.resources, {*sampled, *materials}
         check_kept_text(step, texts, cls, resources)
         check_program(step, program, texts, resources, uniforms, blocks, sampled, cls)

@@ -39,7 +39,7 @@ EMITTER = np.dtype([("instance", "<i4"), ("triangle", "<i4")])
 _OPTIONAL = {"tangents": 4, "uv0": 2, "uv1": 2, "colors": 4}
 """Vertex streams that a scene may lack, behind positions and normals, with their widths."""
 
-MOST_ARRAYS = 6
+MOST_ARRAYS = 5
 """Texture arrays of a scene; with the other textures of a step they must fit into the 16 units of a stage."""
 BORDER = 1
 """Texels around an image in its layer, which repeat it as its wrap modes say, so that filtering finds them there."""
@@ -132,12 +132,12 @@ def texture_data(scene: Scene, sizes: Mapping[Stored, tuple[int, int]], arrays: 
 def scene_data_facts(scene: Scene, rays: bool = False) -> SceneDataFacts:
     """Return what inputs of `SceneData` bring along in this scene, some of them with `rays`."""
     vertices = sum(len(mesh.positions) for mesh in scene.meshes)
-    width = 6 + sum(size for name, size in _OPTIONAL.items() if any(getattr(m, name) is not None for m in scene.meshes))
+    width = _vertex_floats([name for name in _OPTIONAL if any(getattr(m, name) is not None for m in scene.meshes)])
     emitters = sum(len(scene.meshes[scene.objects[number].mesh].indices) for number in emitting_objects(scene))
     textures = expected_arrays(scene)
     trees = most_bytes(scene) if rays else 0
     return SceneDataFacts(
-        bytes=4 * width * vertices
+        bytes=16 * -(-width // 4) * vertices
         + INSTANCE_DATA.itemsize * len(scene.objects)
         + EMITTER.itemsize * emitters
         + 16 * slot_count(scene.materials) * len(scene.materials) * bool(textures.arrays)
@@ -181,7 +181,12 @@ def data_macros(scene: Scene, packed: PackedScene, arrays: TextureArrays) -> dic
         "TRACE_STACK": str(stack_size(scene)),
         **{f"SCENE_{name.upper()}": str(bit) for name, bit in FLAGS.items()},
     }
-    macros |= {f"SCENE_{name.upper()}_STREAM": "1" for name in _OPTIONAL if getattr(packed, name) is not None}
+    used_streams = [name for name in _OPTIONAL if getattr(packed, name) is not None]
+    macros |= {
+        f"SCENE_{name.upper()}_STREAM": str(_vertex_floats(used_streams[:number]))  # its first float
+        for number, name in enumerate(used_streams)
+    }
+    macros["SCENE_VERTEX_ROWS"] = str(-(-_vertex_floats(used_streams) // 4))
     if arrays.arrays:
         macros |= {"SCENE_TEXTURES": "1", "SCENE_ARRAY_COUNT": str(len(arrays.arrays))}
     used = dict.fromkeys(SLOTS, 0)
@@ -202,9 +207,15 @@ def data_macros(scene: Scene, packed: PackedScene, arrays: TextureArrays) -> dic
 
 
 def vertex_data(packed: PackedScene) -> npt.NDArray[np.float32]:
-    """Return the vertices, float32 (v, w): position, normal, and what else some mesh has."""
+    """Return the vertices, float32 (v, 4 rows): position, normal, and what else some mesh has."""
     found = [getattr(packed, name) for name in ("positions", "normals", *_OPTIONAL)]
-    return np.concatenate([stream for stream in found if stream is not None], axis=1)
+    vertices = np.concatenate([stream for stream in found if stream is not None], axis=1)
+    return np.pad(vertices, ((0, 0), (0, -vertices.shape[1] % 4)))
+
+
+def _vertex_floats(streams: Sequence[str]) -> int:
+    """Return how many floats position, normal and these streams have."""
+    return 6 + sum(_OPTIONAL[name] for name in streams)
 
 
 def instance_data(scene: Scene, packed: PackedScene) -> Records:

@@ -6,7 +6,7 @@
 // Light that passes straight through a transmissive surface: all of it through a thin wall, and the root of this factor
 // through each of the two sides of a volume.
 vec3 passing_light(Hit hit) {
-    MaterialData m = materials[MATERIAL_INDEX(scene_instances[hit.instance].material)];
+    MaterialData m = materials[MATERIAL_INDEX(scene_instance(hit.instance).material)];
     float factor = m.transmission.x * (1.0 - m.surface.x);
 #ifdef SCENE_TRANSMISSION_ARRAYS
     ivec3 v = scene_triangle(hit.instance, hit.triangle);

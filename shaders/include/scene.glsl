@@ -23,7 +23,7 @@ void scene_tangent_frame(
 #endif
     int set = 0;
 #ifdef SCENE_NORMAL_ARRAYS
-    set = scene_textures[MATERIAL_INDEX(scene_instances[instance].material) * MATERIAL_SLOTS + NORMAL_SLOT].w & 1;
+    set = scene_texture(MATERIAL_INDEX(scene_instance(instance).material), NORMAL_SLOT).w & 1;
 #endif
     vec2 uv = scene_vertex_uv(v.x, set);
     vec2 uv_a = scene_vertex_uv(v.y, set) - uv, uv_b = scene_vertex_uv(v.z, set) - uv;
@@ -83,8 +83,8 @@ LayerTexels scene_layer_texels(
 // Everything a shading model reads: the surface that a geometry pass shades there, seen along -view_dir. Nothing is
 // discarded: `scene_alpha` is compared with the material's cutoff by the caller, where there is SCENE_MASKED.
 Surface scene_surface(int instance, int triangle, vec2 barycentrics, vec3 view_dir) {
-    int flags = scene_instances[instance].flags;
-    MaterialData m = materials[MATERIAL_INDEX(scene_instances[instance].material)];
+    int flags = scene_instance(instance).flags;
+    MaterialData m = materials[MATERIAL_INDEX(scene_instance(instance).material)];
     ivec3 v = scene_triangle(instance, triangle);
     vec3 w = scene_weights(barycentrics);
     mat3 corners = scene_corners(instance, triangle);
@@ -150,7 +150,7 @@ Surface scene_surface(int instance, int triangle, vec2 barycentrics, vec3 view_d
 #endif
     material_surface(s, m, texels, flip_normal, (flags & SCENE_UNLIT) == 0);
 #if defined(SCENE_LAYERS) && defined(HAS_LAYERS)
-    vec4 rows[3] = scene_instances[instance].rows;
+    vec4 rows[3] = scene_instance(instance).rows;
     material_layers(s, m, layers, pow(abs(dot(rows[0].xyz, cross(rows[1].xyz, rows[2].xyz))), 1.0 / 3.0));
 #endif
     return s;

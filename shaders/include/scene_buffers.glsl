@@ -1,21 +1,6 @@
-// The buffers of the scene as data, and what lies in them: vertices, instances and emitting triangles.
-struct SceneVertex {
-    float position[3];
-    float normal[3];
-#ifdef SCENE_TANGENTS_STREAM
-    float tangent[4];
-#endif
-#ifdef SCENE_UV0_STREAM
-    float uv0[2];
-#endif
-#ifdef SCENE_UV1_STREAM
-    float uv1[2];
-#endif
-#ifdef SCENE_COLORS_STREAM
-    float color[4];
-#endif
-};
-
+// The buffers of the scene as data, and what lies in them: vertices, instances and emitting triangles. Vertices and
+// instances are fetched as texels, which software rasterisers do in a third of the time that elements of a storage
+// block take them.
 struct SceneInstance {
     vec4 rows[3];       // of the affine object-to-world matrix
     int material;       // number in `materials`
@@ -45,9 +30,8 @@ struct SceneEmitter {
     int triangle;
 };
 
-layout(std430) readonly buffer scene_vertex_block {
-    SceneVertex scene_vertices[];
-};
+uniform samplerBuffer scene_vertex_texels;     // of each vertex SCENE_VERTEX_ROWS: position, normal, and what else it has
+uniform isamplerBuffer scene_instance_texels;  // `scene_instances`, and behind them the textures of materials
 layout(std430) readonly buffer scene_index_block {
     uint scene_indices[];
 };
@@ -58,41 +42,58 @@ layout(std430) readonly buffer scene_emitter_block {
     SceneEmitter scene_emitters[];  // SCENE_EMITTER_COUNT
 };
 
+const int SCENE_INSTANCE_ROWS = 7;
+
+// The record of an instance, as in `scene_instances`.
+SceneInstance scene_instance(int instance) {
+    int at = SCENE_INSTANCE_ROWS * instance;
+    vec4 matrix[3], box[2];
+    for (int row = 0; row < 3; ++row) matrix[row] = intBitsToFloat(texelFetch(scene_instance_texels, at + row));
+    ivec4 a = texelFetch(scene_instance_texels, at + 3), b = texelFetch(scene_instance_texels, at + 4);
+    for (int row = 0; row < 2; ++row) box[row] = intBitsToFloat(texelFetch(scene_instance_texels, at + 5 + row));
+    return SceneInstance(matrix, a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, box[0], box[1]);
+}
+
 // Whether an instance has a `flag`: SCENE_CASTS_SHADOW, SCENE_MIRRORED, …
 bool scene_has(int instance, int flag) {
-    return (scene_instances[instance].flags & flag) != 0;
+    return (scene_instance(instance).flags & flag) != 0;
 }
 
 // The command that draws an instance, or nothing where `is_drawn` is false.
 DrawCommand scene_draw_command(int instance, bool is_drawn) {
-    SceneInstance i = scene_instances[instance];
+    SceneInstance i = scene_instance(instance);
     return DrawCommand(uint(3 * i.triangles), is_drawn ? 1u : 0u, uint(i.first_index), i.base_vertex, uint(instance));
 }
 
-// The numbers of a triangle's vertices in `scene_vertices`.
+// The numbers of a triangle's vertices.
 ivec3 scene_triangle(int instance, int triangle) {
-    SceneInstance i = scene_instances[instance];
+    SceneInstance i = scene_instance(instance);
     int first = i.first_index + 3 * triangle;
     return i.base_vertex + ivec3(scene_indices[first], scene_indices[first + 1], scene_indices[first + 2]);
 }
 
+// Floats of a vertex from an even one on.
+vec4 scene_vertex_floats(int vertex, int first) {
+    int row = vertex * SCENE_VERTEX_ROWS + first / 4;
+    vec4 floats = texelFetch(scene_vertex_texels, row);
+    return first % 4 == 0 ? floats : vec4(floats.zw, texelFetch(scene_vertex_texels, row + 1).xy);
+}
+
 // Object-space position of a vertex, in metres.
 vec3 scene_vertex_position(int vertex) {
-    float p[3] = scene_vertices[vertex].position;
-    return vec3(p[0], p[1], p[2]);
+    return texelFetch(scene_vertex_texels, vertex * SCENE_VERTEX_ROWS).xyz;
 }
 
 // Object-space unit normal of a vertex.
 vec3 scene_vertex_normal(int vertex) {
-    float n[3] = scene_vertices[vertex].normal;
-    return vec3(n[0], n[1], n[2]);
+    int row = vertex * SCENE_VERTEX_ROWS;
+    return vec3(texelFetch(scene_vertex_texels, row).w, texelFetch(scene_vertex_texels, row + 1).xy);
 }
 
 // Object-space tangent of a vertex, and the bitangent's sign in w.
 vec4 scene_vertex_tangent(int vertex) {  // 0 where the mesh has none
 #ifdef SCENE_TANGENTS_STREAM
-    float t[4] = scene_vertices[vertex].tangent;
-    return vec4(t[0], t[1], t[2], t[3]);
+    return scene_vertex_floats(vertex, SCENE_TANGENTS_STREAM);
 #else
     return vec4(0.0);
 #endif
@@ -102,10 +103,10 @@ vec4 scene_vertex_tangent(int vertex) {  // 0 where the mesh has none
 vec2 scene_vertex_uv(int vertex, int set) {  // 0 where the mesh has none
     vec2 uv = vec2(0.0);
 #ifdef SCENE_UV0_STREAM
-    if (set == 0) uv = vec2(scene_vertices[vertex].uv0[0], scene_vertices[vertex].uv0[1]);
+    if (set == 0) uv = scene_vertex_floats(vertex, SCENE_UV0_STREAM).xy;
 #endif
 #ifdef SCENE_UV1_STREAM
-    if (set == 1) uv = vec2(scene_vertices[vertex].uv1[0], scene_vertices[vertex].uv1[1]);
+    if (set == 1) uv = scene_vertex_floats(vertex, SCENE_UV1_STREAM).xy;
 #endif
     return uv;
 }
@@ -113,8 +114,7 @@ vec2 scene_vertex_uv(int vertex, int set) {  // 0 where the mesh has none
 // Colour of a vertex, linear RGB and alpha.
 vec4 scene_vertex_color(int vertex) {  // white where the mesh has none
 #ifdef SCENE_COLORS_STREAM
-    float c[4] = scene_vertices[vertex].color;
-    return vec4(c[0], c[1], c[2], c[3]);
+    return scene_vertex_floats(vertex, SCENE_COLORS_STREAM);
 #else
     return vec4(1.0);
 #endif

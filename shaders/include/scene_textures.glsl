@@ -3,11 +3,6 @@
 #include <scene_triangles.glsl>
 
 #ifdef SCENE_TEXTURES
-// Of each material its MATERIAL_SLOTS slots: array (-1 without a texture), layer, width | height << 16, and bits: UV
-// set, 2 without filtering, 4 and 16 times the wrap mode along s and t (0 repeat, 1 mirror, 2 clamp).
-layout(std430) readonly buffer scene_texture_block {
-    ivec4 scene_textures[];
-};
 uniform sampler2DArray scene_array_0;
 #endif
 #if SCENE_ARRAY_COUNT > 1
@@ -21,9 +16,6 @@ uniform sampler2DArray scene_array_3;
 #endif
 #if SCENE_ARRAY_COUNT > 4
 uniform sampler2DArray scene_array_4;
-#endif
-#if SCENE_ARRAY_COUNT > 5
-uniform sampler2DArray scene_array_5;
 #endif
 
 // The two sets of texture coordinates at a point.
@@ -41,6 +33,13 @@ SceneCoordinates scene_coordinates(ivec3 v, vec3 w) {
 }
 
 #ifdef SCENE_TEXTURES
+// Of a material's slot: array (-1 without a texture), layer, width | height << 16, and bits: UV set, 2 without filtering,
+// 4 and 16 times the wrap mode along s and t (0 repeat, 1 mirror, 2 clamp).
+ivec4 scene_texture(int material, int slot) {
+    int first = SCENE_INSTANCE_ROWS * SCENE_INSTANCE_COUNT;
+    return texelFetch(scene_instance_texels, first + material * MATERIAL_SLOTS + slot);
+}
+
 // A texture coordinate `u` from 0 to 1, as the wrap `mode` of a sampler has it: 0 repeats, 1 mirrors, 2 clamps.
 float scene_wrapped(float u, int mode) {
     float mirrored = 1.0 - abs(mod(u, 2.0) - 1.0);
@@ -51,8 +50,8 @@ float scene_wrapped(float u, int mode) {
 // it. `arrays` are the arrays that textures of the slot lie in, a constant. The border of a layer holds what lies
 // across the image's edges.
 bool scene_texel(int instance, int slot, int arrays, SceneCoordinates c, out vec4 texel) {
-    int material = MATERIAL_INDEX(scene_instances[instance].material);
-    ivec4 entry = scene_textures[material * MATERIAL_SLOTS + slot];
+    int material = MATERIAL_INDEX(scene_instance(instance).material);
+    ivec4 entry = scene_texture(material, slot);
     int set = entry.w & 1;
     texel = vec4(1.0);
     if (entry.x < 0 || !scene_has(instance, set == 1 ? SCENE_HAS_UV1 : SCENE_HAS_UV0)) return false;
@@ -79,9 +78,6 @@ bool scene_texel(int instance, int slot, int arrays, SceneCoordinates c, out vec
 #if SCENE_ARRAY_COUNT > 4
     SCENE_SAMPLE(4, scene_array_4)
 #endif
-#if SCENE_ARRAY_COUNT > 5
-    SCENE_SAMPLE(5, scene_array_5)
-#endif
 #undef SCENE_SAMPLE
     return true;
 }
@@ -89,7 +85,7 @@ bool scene_texel(int instance, int slot, int arrays, SceneCoordinates c, out vec
 
 // Base colour and alpha: material factor × texture × vertex colour, with `v` and `w` as above and the coordinates `c`.
 vec4 scene_base_color(int instance, ivec3 v, vec3 w, SceneCoordinates c) {
-    vec4 color = materials[MATERIAL_INDEX(scene_instances[instance].material)].base_color;
+    vec4 color = materials[MATERIAL_INDEX(scene_instance(instance).material)].base_color;
 #ifdef SCENE_BASE_COLOR_ARRAYS
     vec4 texel;
     if (scene_texel(instance, BASE_COLOR_SLOT, SCENE_BASE_COLOR_ARRAYS, c, texel)) color *= texel;

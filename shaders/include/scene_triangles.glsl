@@ -3,20 +3,20 @@
 
 // World-space position of an object-space `point` of an instance.
 vec3 scene_point_to_world(int instance, vec3 point) {
-    vec4 rows[3] = scene_instances[instance].rows;
+    vec4 rows[3] = scene_instance(instance).rows;
     vec4 p = vec4(point, 1.0);
     return vec3(dot(rows[0], p), dot(rows[1], p), dot(rows[2], p));
 }
 
 // World-space vector of an object-space `direction` of an instance; not normalized.
 vec3 scene_direction_to_world(int instance, vec3 direction) {
-    vec4 rows[3] = scene_instances[instance].rows;
+    vec4 rows[3] = scene_instance(instance).rows;
     return vec3(dot(rows[0].xyz, direction), dot(rows[1].xyz, direction), dot(rows[2].xyz, direction));
 }
 
 // As `normal_to_world()` of `transform.glsl`: the cofactor matrix, with the sign of the determinant.
 vec3 scene_normal_to_world(int instance, vec3 normal) {
-    vec4 rows[3] = scene_instances[instance].rows;
+    vec4 rows[3] = scene_instance(instance).rows;
 #ifdef UNIFORM_SCALE
     return scene_direction_to_world(instance, normal);
 #else

@@ -5,7 +5,7 @@
 #ifdef SCENE_ANY_MASKED
 // Whether an alpha mask has cut away the surface at a hit.
 bool trace_is_cut_away(Hit hit) {
-    float cutoff = materials[MATERIAL_INDEX(scene_instances[hit.instance].material)].emissive.a;
+    float cutoff = materials[MATERIAL_INDEX(scene_instance(hit.instance).material)].emissive.a;
     return scene_has(hit.instance, SCENE_MASKED) && scene_alpha(hit.instance, hit.triangle, hit.barycentrics) < cutoff;
 }
 #endif
@@ -13,13 +13,16 @@ bool trace_is_cut_away(Hit hit) {
 // The nearest surface along a ray between two distances in lengths of the direction. It finds transparent surfaces,
 // too, but not what an alpha mask cuts away, and no hidden objects.
 bool nearest_hit(vec3 origin, vec3 direction, float nearest, float farthest, out Hit hit) {
-    bool is_hit = trace(origin, direction, nearest, farthest, 0, 0, false, hit);
 #ifdef SCENE_ANY_MASKED
-    while (is_hit && trace_is_cut_away(hit)) {
-        is_hit = trace(origin, direction, hit.distance, farthest, 0, 0, false, hit);
+    RayQuery query = ray_query(origin, direction, nearest, farthest, 0, 0, SCENE_MASKED, false);
+    while (find_candidate(query)) {
+        if (!trace_is_cut_away(query.candidate)) accept_candidate(query);
     }
+    hit = query.hit;
+    return hit.instance >= 0;
+#else
+    return trace(origin, direction, nearest, farthest, 0, 0, false, hit);
 #endif
-    return is_hit;
 }
 
 // The same for a ray of the camera: what geometry passes draw, so nothing that shows its back and has one side.
@@ -35,15 +38,14 @@ bool visible_hit(vec3 origin, vec3 direction, float nearest, float farthest, out
 // Whether anything of these flags lies between two distances. Transparent surfaces do not count.
 bool any_hit(vec3 origin, vec3 direction, float nearest, float farthest, int wanted) {
     const int PASSING = SCENE_BLENDED | SCENE_TRANSMITS;
-    Hit hit;
 #ifdef SCENE_ANY_MASKED
-    if (trace(origin, direction, nearest, farthest, wanted, PASSING | SCENE_MASKED, true, hit)) return true;
-    bool is_hit = trace(origin, direction, nearest, farthest, wanted | SCENE_MASKED, 0, false, hit);
-    while (is_hit && trace_is_cut_away(hit)) {
-        is_hit = trace(origin, direction, hit.distance, farthest, wanted | SCENE_MASKED, 0, false, hit);
+    RayQuery query = ray_query(origin, direction, nearest, farthest, wanted, PASSING, SCENE_MASKED, true);
+    while (find_candidate(query)) {
+        if (!trace_is_cut_away(query.candidate)) accept_candidate(query);
     }
-    return is_hit;
+    return query.hit.instance >= 0;
 #else
+    Hit hit;
     return trace(origin, direction, nearest, farthest, wanted, PASSING, true, hit);
 #endif
 }

@@ -26,66 +26,114 @@ vec3 trace_permuted(vec3 v, int last) {
     return last == 2 ? v : last == 0 ? v.yzx : v.zxy;
 }
 
-// The nearest hit between two distances, both exclusive, of what has all flags in `wanted` and none in `rejected`. With
-// `any` the search ends at the first hit that is found: `ends` is then true, unless it has a flag of `passing`; of
-// those the nearest is the hit. The triangle test is that of S. Woop, C. Benthin and I. Wald ("Watertight Ray/Triangle
-// Intersection", 2013): no ray passes between two triangles that share an edge.
+int trace_stack[TRACE_STACK];
+
+// A search along a ray, as in other interfaces for ray queries: it stops at candidates, hits of triangles with a flag of
+// `asks`, for the caller to accept or to leave out. All other hits are accepted at once.
+struct RayQuery {
+    Hit hit;        // the nearest that is accepted, or the first with `any`; its instance is -1 if there is none
+    Hit candidate;  // where the search has stopped
+    vec3 origin;
+    vec3 direction;
+    float nearest;
+    float reach;    // the distance beyond which nothing counts any more
+    int wanted;     // flags of what is met: all of them
+    int rejected;   // and none of these
+    int asks;
+    bool any;       // the search ends at the first hit that is accepted
+    // Where the search is: the node, the stack of those to come, and the ray on the grid of the tree and in the object.
+    int node;
+    int top;
+    bool in_mesh;
+    vec3 grid_origin;
+    vec3 inverse;
+    vec3 object_origin;
+    vec3 shear;
+    int axis;
+    int instance;
+    int flags;
+};
+
+// A search between two distances, both exclusive, for what has all flags in `wanted` and none in `rejected`.
+RayQuery ray_query(
+    vec3 origin, vec3 direction, float nearest, float farthest, int wanted, int rejected, int asks, bool any) {
+    RayQuery q;
+    q.hit = q.candidate = Hit(farthest, -1, -1, vec2(0.0));
+    q.origin = origin;
+    q.direction = direction;
+    q.nearest = nearest;
+    q.reach = farthest;
+    q.wanted = wanted;
+    q.rejected = rejected;
+    q.asks = asks;
+    q.any = any;
+    ivec4 header = SCENE_TREE(0), header2 = SCENE_TREE(1);
+    // Invocations outside a triangle that run along in a fragment shader may read 0 everywhere, and then their rays are
+    // not numbers, which enter every box.
+    bool is_ray = dot(abs(origin) + abs(direction), vec3(1.0)) < 1e30;
+    q.node = header2.w > 0 && is_ray ? header.w : TRACE_END;
+    trace_stack[0] = TRACE_END;
+    q.top = 1;
+    q.in_mesh = false;
+    q.grid_origin = (origin - intBitsToFloat(header.xyz)) * intBitsToFloat(header2.xyz);
+    q.inverse = trace_inverse(direction * intBitsToFloat(header2.xyz));
+    q.object_origin = q.shear = vec3(0.0);
+    q.axis = q.flags = 0;
+    q.instance = -1;
+    return q;
+}
+
+// Accepts the candidate.
+void accept_candidate(inout RayQuery q) {
+    q.hit = q.candidate;
+    q.reach = q.candidate.distance;
+    if (q.any) q.node = TRACE_END;
+}
+
+// Continues the search: true where it has stopped at a candidate, false where it has ended. The triangle test is that of
+// S. Woop, C. Benthin and I. Wald ("Watertight Ray/Triangle Intersection", 2013): no ray passes between two triangles
+// that share an edge.
 //
 // Each turn of the inner loop visits two nodes and tests a triangle, and invocations leave it only when nothing is left
 // of the tree. Those that a processor runs in lockstep then do the same work most of the time, and the set of those
 // that are active seldom changes, which llvmpipe's branches can predict. The stack cannot overflow: depths of trees are
 // limited when they are built, and TRACE_STACK follows from the limits.
-bool trace(
-    vec3 origin, vec3 direction, float nearest, float farthest, int wanted, int rejected, bool any, int passing,
-    out Hit hit, out bool ends) {
-    int stack[TRACE_STACK];
-    stack[0] = TRACE_END;
-    int top = 1;
+bool find_candidate(inout RayQuery q) {
     ivec4 header = SCENE_TREE(0), header2 = SCENE_TREE(1);
-    // Invocations outside a triangle that run along in a fragment shader may read 0 everywhere, and then their rays are
-    // not numbers, which enter every box.
-    bool is_ray = dot(abs(origin) + abs(direction), vec3(1.0)) < 1e30;
-    int node = header2.w > 0 && is_ray ? header.w : TRACE_END;
-    vec3 top_origin = (origin - intBitsToFloat(header.xyz)) * intBitsToFloat(header2.xyz);
-    vec3 top_inverse = trace_inverse(direction * intBitsToFloat(header2.xyz));
-    vec3 grid_origin = top_origin, inverse = top_inverse;  // of the ray on the grid of the tree
-    vec3 object_origin = vec3(0.0), shear = vec3(0.0);
-    int axis = 0, instance = -1, flags = 0;
-    bool in_mesh = false;
-    float reach = farthest;
-    ends = false;
-    hit = Hit(farthest, -1, -1, vec2(0.0));
+    vec3 top_origin = (q.origin - intBitsToFloat(header.xyz)) * intBitsToFloat(header2.xyz);
+    vec3 top_inverse = trace_inverse(q.direction * intBitsToFloat(header2.xyz));
+    int node = q.node, top = q.top, after = TRACE_END;
+    bool stops = false;
     do {
-        bool goes_up = node == TRACE_UP;
-        if (goes_up) {
-            in_mesh = false;
-            grid_origin = top_origin;
-            inverse = top_inverse;
+        if (node == TRACE_UP) {
+            q.in_mesh = false;
+            q.grid_origin = top_origin;
+            q.inverse = top_inverse;
             --top;
-            node = stack[top];
+            node = trace_stack[top];
         }
-        if (node < 0 && !in_mesh) {  // an object
-            instance = -1 - node;
-            int at = 2 + 5 * instance;
+        if (node < 0 && !q.in_mesh) {  // an object
+            q.instance = -1 - node;
+            int at = 2 + 5 * q.instance;
             ivec4 r0 = SCENE_TREE(at), r1 = SCENE_TREE(at + 1), r2 = SCENE_TREE(at + 2);
             ivec4 low = SCENE_TREE(at + 3), scale = SCENE_TREE(at + 4);
-            vec4 m0 = intBitsToFloat(r0), m1 = intBitsToFloat(r1), m2 = intBitsToFloat(r2), o = vec4(origin, 1.0);
-            object_origin = vec3(dot(m0, o), dot(m1, o), dot(m2, o));
-            vec3 d = vec3(dot(m0.xyz, direction), dot(m1.xyz, direction), dot(m2.xyz, direction));
+            vec4 m0 = intBitsToFloat(r0), m1 = intBitsToFloat(r1), m2 = intBitsToFloat(r2), o = vec4(q.origin, 1.0);
+            q.object_origin = vec3(dot(m0, o), dot(m1, o), dot(m2, o));
+            vec3 d = vec3(dot(m0.xyz, q.direction), dot(m1.xyz, q.direction), dot(m2.xyz, q.direction));
             vec3 size = abs(d);
-            axis = size.x > size.y && size.x > size.z ? 0 : size.y > size.z ? 1 : 2;
-            vec3 permuted = trace_permuted(d, axis);
-            shear = vec3(permuted.xy, 1.0) / permuted.z;
-            flags = scale.w;  // below 0 for the shared tree, whose triangles have them
-            bool is_wanted = flags < 0 || ((flags & wanted) == wanted && (flags & rejected) == 0);
-            int next = stack[max(top - 1, 0)];
+            q.axis = size.x > size.y && size.x > size.z ? 0 : size.y > size.z ? 1 : 2;
+            vec3 permuted = trace_permuted(d, q.axis);
+            q.shear = vec3(permuted.xy, 1.0) / permuted.z;
+            q.flags = scale.w;  // below 0 for the shared tree, whose triangles have them
+            bool is_wanted = q.flags < 0 || ((q.flags & q.wanted) == q.wanted && (q.flags & q.rejected) == 0);
+            int next = trace_stack[max(top - 1, 0)];
             bool is_last = next == TRACE_END;  // so there is no way back
             if (is_wanted) {
-                grid_origin = (object_origin - intBitsToFloat(low.xyz)) * intBitsToFloat(scale.xyz);
-                inverse = trace_inverse(d * intBitsToFloat(scale.xyz));
-                in_mesh = true;
+                q.grid_origin = (q.object_origin - intBitsToFloat(low.xyz)) * intBitsToFloat(scale.xyz);
+                q.inverse = trace_inverse(d * intBitsToFloat(scale.xyz));
+                q.in_mesh = true;
             }
-            stack[top] = TRACE_UP;
+            trace_stack[top] = TRACE_UP;
             top += is_wanted ? (is_last ? 0 : 1) : -1;
             node = is_wanted ? low.w : next;
         }
@@ -96,61 +144,71 @@ bool trace(
                 bool is_inner = uint(node) < uint(TRACE_UP);
                 int row = is_inner ? node : 0;
                 ivec4 low = SCENE_TREE(row), high = SCENE_TREE(row + 1);
-                a = (vec3(low.xyz & 0xFFFF) - grid_origin) * inverse;
-                b = (vec3(high.xyz & 0xFFFF) - grid_origin) * inverse;
-                c = (vec3((low.xyz >> 16) & 0xFFFF) - grid_origin) * inverse;
-                d = (vec3((high.xyz >> 16) & 0xFFFF) - grid_origin) * inverse;
+                a = (vec3(low.xyz & 0xFFFF) - q.grid_origin) * q.inverse;
+                b = (vec3(high.xyz & 0xFFFF) - q.grid_origin) * q.inverse;
+                c = (vec3((low.xyz >> 16) & 0xFFFF) - q.grid_origin) * q.inverse;
+                d = (vec3((high.xyz >> 16) & 0xFFFF) - q.grid_origin) * q.inverse;
                 vec3 enter = min(a, b), leave = max(a, b);
-                float left_enter = max(max(enter.x, enter.y), max(enter.z, nearest));
-                float left_leave = min(min(leave.x, leave.y), min(leave.z, reach));
+                float left_enter = max(max(enter.x, enter.y), max(enter.z, q.nearest));
+                float left_leave = min(min(leave.x, leave.y), min(leave.z, q.reach));
                 enter = min(c, d);
                 leave = max(c, d);
-                float right_enter = max(max(enter.x, enter.y), max(enter.z, nearest));
-                float right_leave = min(min(leave.x, leave.y), min(leave.z, reach));
+                float right_enter = max(max(enter.x, enter.y), max(enter.z, q.nearest));
+                float right_leave = min(min(leave.x, leave.y), min(leave.z, q.reach));
                 bool left = left_enter <= left_leave * 1.000001, right = right_enter <= right_leave * 1.000001;
                 bool right_first = right && (!left || right_enter < left_enter);
-                stack[top] = right_first ? low.w : high.w;
-                next = stack[max(top - 1, 0)];
+                trace_stack[top] = right_first ? low.w : high.w;
+                next = trace_stack[max(top - 1, 0)];
                 next = left || right ? (right_first ? high.w : low.w) : next;
                 top += !is_inner ? 0 : left && right ? 1 : left || right ? 0 : -1;
                 node = is_inner ? next : node;
             }
 
-            bool is_leaf = node < 0 && in_mesh;
+            bool is_leaf = node < 0 && q.in_mesh;
             int leaf = is_leaf ? -1 - node : 0, at = header2.w + 3 * (leaf >> 2);
             ivec4 first = SCENE_TREE(at), second = SCENE_TREE(at + 1), third = SCENE_TREE(at + 2);
             // Triangles must compute the same numbers for a shared edge: no fused multiply-add may come in.
-            precise vec3 p = trace_permuted(intBitsToFloat(first.xyz) - object_origin, axis);
-            precise vec3 q = trace_permuted(intBitsToFloat(second.xyz) - object_origin, axis);
-            precise vec3 r = trace_permuted(intBitsToFloat(third.xyz) - object_origin, axis);
-            p.xy -= shear.xy * p.z;
-            q.xy -= shear.xy * q.z;
-            r.xy -= shear.xy * r.z;
-            precise vec3 edges = vec3(r.x * q.y - r.y * q.x, p.x * r.y - p.y * r.x, q.x * p.y - q.y * p.x);
+            precise vec3 p = trace_permuted(intBitsToFloat(first.xyz) - q.object_origin, q.axis);
+            precise vec3 r = trace_permuted(intBitsToFloat(third.xyz) - q.object_origin, q.axis);
+            precise vec3 o = trace_permuted(intBitsToFloat(second.xyz) - q.object_origin, q.axis);
+            p.xy -= q.shear.xy * p.z;
+            o.xy -= q.shear.xy * o.z;
+            r.xy -= q.shear.xy * r.z;
+            precise vec3 edges = vec3(r.x * o.y - r.y * o.x, p.x * r.y - p.y * r.x, o.x * p.y - o.y * p.x);
             float sum = edges.x + edges.y + edges.z, over = 1.0 / sum;
             bool inside = all(greaterThanEqual(edges, vec3(0.0))) || all(lessThanEqual(edges, vec3(0.0)));
-            float distance = dot(edges, vec3(p.z, q.z, r.z)) * shear.z * over;
-            int own = third.w < 0 ? flags : third.w;
-            bool is_hit = is_leaf && inside && sum != 0.0 && distance > nearest && distance < hit.distance
-                && (own & wanted) == wanted && (own & rejected) == 0;
-            next = stack[max(top - 1, 0)];
+            float distance = dot(edges, vec3(p.z, o.z, r.z)) * q.shear.z * over;
+            int own = third.w < 0 ? q.flags : third.w;
+            bool is_hit = is_leaf && inside && sum != 0.0 && distance > q.nearest && distance < q.reach
+                && (own & q.wanted) == q.wanted && (own & q.rejected) == 0;
+            next = trace_stack[max(top - 1, 0)];
             bool is_last = (leaf & 3) == 0;
             top -= is_leaf && is_last ? 1 : 0;
             node = !is_leaf ? node : is_last ? next : node - 3;  // a leaf of the others
             if (is_hit) {
-                hit = Hit(distance, third.w < 0 ? instance : second.w, first.w, edges.yz * over);
-                ends = any && (own & passing) == 0;
-                node = ends ? TRACE_END : node;
-                reach = any ? reach : distance;
+                Hit found = Hit(distance, third.w < 0 ? q.instance : second.w, first.w, edges.yz * over);
+                stops = (own & q.asks) != 0;
+                after = stops ? node : TRACE_END;
+                q.candidate = found;
+                if (!stops) {
+                    q.hit = found;
+                    q.reach = distance;
+                }
+                node = stops || q.any ? TRACE_END : node;
             }
-        } while (node < TRACE_UP && (node >= 0 || in_mesh));
+        } while (node < TRACE_UP && (node >= 0 || q.in_mesh));
     } while (node != TRACE_END);
-    return hit.instance >= 0;
+    q.node = after;
+    q.top = top;
+    return stops;
 }
 
-// The same without anything that lets light pass; `any` ends the search at the first hit.
+// The nearest hit between two distances, both exclusive, of what has all flags in `wanted` and none in `rejected`; with
+// `any` the first that is found.
 bool trace(
     vec3 origin, vec3 direction, float nearest, float farthest, int wanted, int rejected, bool any, out Hit hit) {
-    bool ends;
-    return trace(origin, direction, nearest, farthest, wanted, rejected, any, 0, hit, ends);
+    RayQuery q = ray_query(origin, direction, nearest, farthest, wanted, rejected, 0, any);
+    find_candidate(q);
+    hit = q.hit;
+    return hit.instance >= 0;
 }

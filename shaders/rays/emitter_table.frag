@@ -12,7 +12,7 @@ void main() {
     SceneEmitter emitter = scene_emitters[number];
     mat3 corners = scene_corners(emitter.instance, emitter.triangle);
     float area = 0.5 * length(cross(corners[1] - corners[0], corners[2] - corners[0]));
-    int material = MATERIAL_INDEX(scene_instances[emitter.instance].material);
+    int material = MATERIAL_INDEX(scene_instance(emitter.instance).material);
     float power = area * luminance_of(materials[material].emissive.rgb);
     emitter_table = vec4((corners * vec3(1.0 / 3.0)) * power, power);
 }

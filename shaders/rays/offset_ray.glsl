@@ -9,7 +9,7 @@ vec3 offset_ray(int instance, vec3 position, vec3 normal) {
     ivec3 steps = ivec3(INT_SCALE * normal);
     vec3 moved = intBitsToFloat(floatBitsToInt(position) + mix(steps, -steps, lessThan(position, vec3(0.0))));
     vec3 size = abs(position);
-    vec3 corner = abs(scene_instances[instance].box_center.xyz) + scene_instances[instance].box_extent.xyz;
+    vec3 corner = abs(scene_instance(instance).box_center.xyz) + scene_instance(instance).box_extent.xyz;
     float least = FAR_SCALE * max(max(size.x, size.y), size.z);
     least = max(least, CORNER_SCALE * max(max(corner.x, corner.y), corner.z));
     return mix(moved, position + least * normal, lessThan(size * (1.0 / 65536.0), vec3(least)));

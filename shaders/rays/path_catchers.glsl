@@ -15,7 +15,7 @@ struct CaughtPath {
 bool catches_path(inout Surface s, int instance, bool is_camera, out bool is_plain, out vec3 shown) {
     is_plain = false;
     shown = vec3(1.0);
-    if ((scene_instances[instance].flags & SCENE_SHADOW_CATCHER) == 0 || s.lit == 0.0) return false;
+    if ((scene_instance(instance).flags & SCENE_SHADOW_CATCHER) == 0 || s.lit == 0.0) return false;
 #ifdef USES_ENVIRONMENT
     vec3 from_all_sides = light_from(s.normal, 2.0);
     shown = light_from(caught_direction(s.position, -s.view_dir), -1e-6);

@@ -35,7 +35,7 @@ float emitted_power() {
 
 // Radiance that a triangle emits towards a direction.
 vec3 emission(int instance, int triangle, vec2 barycentrics) {
-    vec3 radiance = materials[MATERIAL_INDEX(scene_instances[instance].material)].emissive.rgb;
+    vec3 radiance = materials[MATERIAL_INDEX(scene_instance(instance).material)].emissive.rgb;
 #ifdef SCENE_EMISSIVE_ARRAYS
     ivec3 v = scene_triangle(instance, triangle);
     vec4 texel;
@@ -128,9 +128,9 @@ SourceSample sample_source(
 // Weight of the emission that a ray has found by itself, with a density, where it had a chance to be chosen before.
 float emission_weight(Hit hit, vec3 normal, vec3 direction, float density, float chance) {
 #ifdef USES_EMITTERS
-    int first = scene_instances[hit.instance].first_emitter, number = first + hit.triangle;
+    int first = scene_instance(hit.instance).first_emitter, number = first + hit.triangle;
     ivec2 at = ivec2(number % EMITTER_TABLE_SIDE, number / EMITTER_TABLE_SIDE);
-    float radiance = luminance_of(materials[MATERIAL_INDEX(scene_instances[hit.instance].material)].emissive.rgb);
+    float radiance = luminance_of(materials[MATERIAL_INDEX(scene_instance(hit.instance).material)].emissive.rgb);
     // The chance of a triangle is its area times this; over the area, as density of directions.
     float chosen = chance * radiance / max(emitted_power(), 1e-37) * hit.distance * hit.distance
         / max(abs(dot(normal, direction)), 1e-9);

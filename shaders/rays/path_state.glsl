@@ -90,7 +90,7 @@ void choose_source(inout Path path, inout Step now, Surface s) {
 
 // Lets a ray meet the surface of a hit, or pass through it.
 void meet_surface(inout Path path, inout Step now, Hit hit, out Surface s) {
-    int flags = scene_instances[hit.instance].flags;
+    int flags = scene_instance(hit.instance).flags;
     s = scene_surface(hit.instance, hit.triangle, hit.barycentrics, -path.direction);
     vec3 front = scene_geometric_normal(hit.instance, hit.triangle);
     bool is_front = dot(front, path.direction) < 0.0, is_double_sided = (flags & SCENE_DOUBLE_SIDED) != 0;
@@ -106,11 +106,6 @@ void meet_surface(inout Path path, inout Step now, Hit hit, out Surface s) {
 #ifdef TRANSMISSION_LAYER
     passes = passes && !path.medium.has_entered;
     now.is_back = !is_front && is_volume(s);
-#endif
-#ifdef SCENE_ANY_MASKED
-    float cutoff = materials[MATERIAL_INDEX(scene_instances[hit.instance].material)].emissive.a;
-    float alpha = scene_alpha(hit.instance, hit.triangle, hit.barycentrics);
-    passes = passes || ((flags & SCENE_MASKED) != 0 && alpha < cutoff);
 #endif
 #ifdef SCENE_ANY_BLENDED
     passes = passes || unit_float(hash(now.dimension, now.point + 77u)) >= s.alpha;

@@ -49,7 +49,7 @@ void main() {
         now.dimension = random + uint(path.vertex) * 8u + path.ahead * 0x10000u;
         Hit hit;
         Surface s;
-        bool is_hit = trace(path.origin, path.direction, path.nearest, path.farthest, 0, 0, false, hit);
+        bool is_hit = nearest_hit(path.origin, path.direction, path.nearest, path.farthest, hit);
         if (is_hit) meet_surface(path, now, hit, s);
 
         // The environment, where a ray has found it or where it is the source.

@@ -319,7 +319,7 @@ def test_alpha_masks_let_rays_through(bench: Any) -> None:
 
 
 def test_a_buffer_that_is_too_large_for_the_device_is_refused(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(bench.session.device.limits, "texture_buffer", 1000)
+    monkeypatch.setitem(bench.session.device.limits, "texture_buffer", 1300)
     origin, direction = random_rays(np.zeros(3), np.ones(3), 64)
     with pytest.raises(rg.errors.RenderError, match=r"RG435 the scene's 'scene_tree' takes"):
         trace(bench, "objects: {one: {shape: sphere, segments: 16}}\n", origin, direction)

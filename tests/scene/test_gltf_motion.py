@@ -231,7 +231,7 @@ def check(gl: Any, path: Path, moments: npt.ArrayLike, clip: int = 0) -> None:
     with gl.device.current():
         white = np.full((1, 1, 4), 255, np.uint8)
         made = GpuScene(gl.device, scene, packed, lambda *_: white, lambda _: white)
-        before, width = made.previous_positions(), made.data.buffers["scene_vertex_block"].size // 4
+        before, width = made.previous_positions(), made.data.buffers["scene_vertex_texels"].size // 4
         width //= len(packed.positions)
         made.tree()
         was = made._streams["in_position"][0].read()
@@ -246,9 +246,9 @@ def check(gl: Any, path: Path, moments: npt.ArrayLike, clip: int = 0) -> None:
                 for name, (buffer, _) in made._streams.items()
             }
             again = GpuScene(gl.device, now, pack.pack(now), lambda *_: white, lambda _: white)
-            assert made.tree()[0].read() == again.tree()[0].read()
+            assert made.tree().read() == again.tree().read()
             again.release(gl.cache.programs)
-            data = np.frombuffer(made.data.buffers["scene_vertex_block"].read(), np.float32).reshape(-1, width)
+            data = np.frombuffer(made.data.buffers["scene_vertex_texels"].read(), np.float32).reshape(-1, width)
             assert (data[:, :3] == streams["in_position"]).all()
             assert (data[:, 3:6] == streams["in_normal"]).all()
             for placed in now.objects:
