@@ -30,7 +30,7 @@ struct SceneEmitter {
     int triangle;
 };
 
-uniform samplerBuffer scene_vertex_texels;     // of each vertex SCENE_VERTEX_ROWS: position, normal, and what else it has
+uniform samplerBuffer scene_vertex_texels;     // of each vertex SCENE_VERTEX_ROWS: position, normal, streams
 uniform isamplerBuffer scene_instance_texels;  // `scene_instances`, and behind them the textures of materials
 layout(std430) readonly buffer scene_index_block {
     uint scene_indices[];

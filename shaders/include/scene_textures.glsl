@@ -33,8 +33,8 @@ SceneCoordinates scene_coordinates(ivec3 v, vec3 w) {
 }
 
 #ifdef SCENE_TEXTURES
-// Of a material's slot: array (-1 without a texture), layer, width | height << 16, and bits: UV set, 2 without filtering,
-// 4 and 16 times the wrap mode along s and t (0 repeat, 1 mirror, 2 clamp).
+// Of a material's slot: array (-1 without a texture), layer, width | height << 16, and bits: UV set, 2 without
+// filtering, 4 and 16 times the wrap mode along s and t (0 repeat, 1 mirror, 2 clamp).
 ivec4 scene_texture(int material, int slot) {
     int first = SCENE_INSTANCE_ROWS * SCENE_INSTANCE_COUNT;
     return texelFetch(scene_instance_texels, first + material * MATERIAL_SLOTS + slot);

@@ -26,10 +26,11 @@ vec3 trace_permuted(vec3 v, int last) {
     return last == 2 ? v : last == 0 ? v.yzx : v.zxy;
 }
 
-int trace_stack[TRACE_STACK];
+int trace_stack[TRACE_STACK];  // of the search that goes on; in a structure it would be copied with each call
 
 // A search along a ray, as in other interfaces for ray queries: it stops at candidates, hits of triangles with a flag of
-// `asks`, for the caller to accept or to leave out. All other hits are accepted at once.
+// `asks`, for the caller to accept or to leave out. All other hits are accepted at once. An invocation has one search at
+// a time.
 struct RayQuery {
     Hit hit;        // the nearest that is accepted, or the first with `any`; its instance is -1 if there is none
     Hit candidate;  // where the search has stopped
@@ -168,16 +169,17 @@ bool find_candidate(inout RayQuery q) {
             int leaf = is_leaf ? -1 - node : 0, at = header2.w + 3 * (leaf >> 2);
             ivec4 first = SCENE_TREE(at), second = SCENE_TREE(at + 1), third = SCENE_TREE(at + 2);
             // Triangles must compute the same numbers for a shared edge: no fused multiply-add may come in.
-            precise vec3 p = trace_permuted(intBitsToFloat(first.xyz) - q.object_origin, q.axis);
-            precise vec3 r = trace_permuted(intBitsToFloat(third.xyz) - q.object_origin, q.axis);
-            precise vec3 o = trace_permuted(intBitsToFloat(second.xyz) - q.object_origin, q.axis);
-            p.xy -= q.shear.xy * p.z;
-            o.xy -= q.shear.xy * o.z;
-            r.xy -= q.shear.xy * r.z;
-            precise vec3 edges = vec3(r.x * o.y - r.y * o.x, p.x * r.y - p.y * r.x, o.x * p.y - o.y * p.x);
+            precise vec3 p0 = trace_permuted(intBitsToFloat(first.xyz) - q.object_origin, q.axis);
+            precise vec3 p1 = trace_permuted(intBitsToFloat(second.xyz) - q.object_origin, q.axis);
+            precise vec3 p2 = trace_permuted(intBitsToFloat(third.xyz) - q.object_origin, q.axis);
+            p0.xy -= q.shear.xy * p0.z;
+            p1.xy -= q.shear.xy * p1.z;
+            p2.xy -= q.shear.xy * p2.z;
+            precise vec3 edges =
+                vec3(p2.x * p1.y - p2.y * p1.x, p0.x * p2.y - p0.y * p2.x, p1.x * p0.y - p1.y * p0.x);
             float sum = edges.x + edges.y + edges.z, over = 1.0 / sum;
             bool inside = all(greaterThanEqual(edges, vec3(0.0))) || all(lessThanEqual(edges, vec3(0.0)));
-            float distance = dot(edges, vec3(p.z, o.z, r.z)) * q.shear.z * over;
+            float distance = dot(edges, vec3(p0.z, p1.z, p2.z)) * q.shear.z * over;
             int own = third.w < 0 ? q.flags : third.w;
             bool is_hit = is_leaf && inside && sum != 0.0 && distance > q.nearest && distance < q.reach
                 && (own & q.wanted) == q.wanted && (own & q.rejected) == 0;
@@ -186,12 +188,11 @@ bool find_candidate(inout RayQuery q) {
             top -= is_leaf && is_last ? 1 : 0;
             node = !is_leaf ? node : is_last ? next : node - 3;  // a leaf of the others
             if (is_hit) {
-                Hit found = Hit(distance, third.w < 0 ? q.instance : second.w, first.w, edges.yz * over);
+                q.candidate = Hit(distance, third.w < 0 ? q.instance : second.w, first.w, edges.yz * over);
                 stops = (own & q.asks) != 0;
                 after = stops ? node : TRACE_END;
-                q.candidate = found;
                 if (!stops) {
-                    q.hit = found;
+                    q.hit = q.candidate;
                     q.reach = distance;
                 }
                 node = stops || q.any ? TRACE_END : node;

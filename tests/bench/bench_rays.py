@@ -19,7 +19,7 @@ import rendergraph as rg
 
 SIZE, SAMPLES = (320, 180), 16
 SIDES = (8, 16, 32, 64, 128, 256, 512)
-SEGMENTS = {"cornell_box": 2.16, "courtyard": 2.63}
+SEGMENTS = {"cornell_box": 2.16, "courtyard": 2.56}
 """Rays with their shadow rays that a path has on average, as counted once in the shader."""
 
 

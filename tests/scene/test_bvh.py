@@ -82,6 +82,17 @@ def test_many_equal_triangles_are_halved() -> None:
     assert tree.depth <= 11
 
 
+def test_the_larger_child_stands_right_behind_its_node() -> None:
+    mesh = soup(700)
+    (tree,) = build(triangle_boxes(*mesh), [700])
+    extent = tree.boxes[:, :, 3:] - tree.boxes[:, :, :3]
+    area = (extent * np.roll(extent, 1, axis=2)).sum(axis=2)
+    inner = np.flatnonzero((tree.children >= 0).all(axis=1))
+    larger = tree.children[inner, np.argmax(area[inner], axis=1)]
+    assert len(inner) > 100
+    np.testing.assert_array_equal(larger, inner + 1)
+
+
 def test_huge_and_tiny_triangles_share_a_tree() -> None:
     positions, triangles = soup(400)
     positions[::7] *= 1e12
