@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from rendergraph.api import Depth, Facts, Input, Port, State, Steps, param
+from rendergraph.api import Depth, Facts, Frame, Input, Port, State, Steps, ViewMatrices, param
 
 from ..geometry._surface_textures import SURFACE_TEXTURES
 from ._lighting import Color, SurfaceLighting, draws_backdrop
@@ -40,6 +40,10 @@ class ImageLighting(SurfaceLighting):
     phong_ambient = SURFACE_TEXTURES["phong_ambient"].input()
 
     background: Color = param(default=0.0, min=0, glsl="vec3", doc="Radiance of the background, a number or RGB.")
+
+    def picture_view(self, frame: Frame) -> ViewMatrices:
+        """Return the view of the G-buffer."""
+        return frame.views(self.depth)[0]
 
     def gbuffer_reads(self, steps: Steps) -> dict[str, Any]:
         """Return what `gbuffer_surface.glsl` reads for the node's shading model."""

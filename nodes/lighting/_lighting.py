@@ -12,6 +12,7 @@ from rendergraph.api import (
     Depth,
     EnvironmentLight,
     Facts,
+    Frame,
     Input,
     Internal,
     Irradiance,
@@ -30,6 +31,8 @@ from rendergraph.api import (
     State,
     Steps,
     View,
+    ViewMatrices,
+    Views,
     Visibility,
     define,
     param,
@@ -37,6 +40,7 @@ from rendergraph.api import (
 )
 
 from ..geometry._samples import Samples
+from ._mirror import mirrored_view
 
 UNDER = Blend("one_minus_dst_alpha", "one")
 Color = float | tuple[float, float, float]
@@ -332,6 +336,22 @@ class SurfaceLighting(Lighting):
         doc="Shadow functions for transparent surfaces, if opaque ones use `visibility`.",
     )
 
+    mirror_view = Views(
+        count=lambda node, facts: int(has_layer(facts, "shadow_catcher")),
+        size=0.5,
+        public=False,
+        doc="The view that sees what the ground mirrors.",
+    )
+    mirrored = Internal(
+        format="rgba16f",
+        size=0.5,
+        mips=0,
+        view="mirror_view",
+        clear=0.0,
+        doc="What the ground mirrors, and its mean over ever larger blocks.",
+    )
+    mirrored_depth = Internal(Depth, format="depth32f", size=0.5, view="mirror_view", clear=0.0)
+
     direct_diffuse = _part("Radiance of diffusely reflected light of the lights.")
     direct_specular = _part("Radiance of specularly reflected light of the lights.")
     environment_reflection = _part(
@@ -359,6 +379,44 @@ class SurfaceLighting(Lighting):
         default=True, doc="Draw transparent surfaces, too; otherwise a `forward_transparent` can draw them."
     )
 
+    def record(self, steps: Steps) -> None:
+        """Record the BRDF table and what the ground mirrors, if the picture shows them."""
+        super().record(steps)
+        if not self.mirrors_ground(steps):
+            return
+        steps.geometry(
+            "forward_lighting.frag",
+            out={"radiance": self.mirrored.mip(0), "depth": self.mirrored_depth},
+            objects=_mirrored_objects(steps.facts),
+            view=self.mirror_view,
+            label="mirrored",
+            **self.lighting_reads(steps, self.transparent_shadows(steps)),
+        )
+        for level in range(1, steps.desc(self.mirrored).mips):
+            source, target = self.mirrored.mip(level - 1), self.mirrored.mip(level)
+            steps.fullscreen("<downsample.frag>", source=source, out=target, label="mirrored")
+
+    def update(self, frame: Frame) -> None:
+        """Set the view that sees what the ground mirrors."""
+        if len(catchers := frame.scene.catchers):
+            height = float(frame.scene.corners[catchers[-1]][:, 1].max())
+            frame.set_views(self.mirror_view, [mirrored_view(self.picture_view(frame), height)])
+
+    def picture_view(self, frame: Frame) -> ViewMatrices:
+        """Return the view of the picture."""
+        return frame.camera
+
+    def mirrors_ground(self, steps: Steps) -> bool:
+        """Return whether the scene has a ground that mirrors objects, and no `reflections` are connected."""
+        facts = steps.facts
+        return (
+            has_layer(facts, "shadow_catcher")
+            and shows_environment(self, facts)
+            and not steps.connected(self.reflections)
+            and not facts.connected("view")
+            and bool(_mirrored_objects(facts))
+        )
+
     def color_targets(self, steps: Steps) -> dict[str, Port]:
         """Return `radiance`, and its parts that are used."""
         ports = self.outputs()
@@ -381,7 +439,9 @@ class SurfaceLighting(Lighting):
         if not has_layer(steps.facts, "shadow_catcher"):
             return {}
         if shows_environment(self, steps.facts):
-            return self.environment_reads(steps) | {"environment": self.environment}
+            mirror = self.mirrored.sampled("trilinear"), self.mirrored_depth
+            mirrored = {"mirrored": mirror[0], "mirrored_depth": mirror[1]} if self.mirrors_ground(steps) else {}
+            return self.environment_reads(steps) | {"environment": self.environment, **mirrored}
         plain = {"background": background_color(self)} if isinstance(self, GeometryLighting) else {}
         return self.environment_reads(steps) | plain
 
@@ -389,7 +449,8 @@ class SurfaceLighting(Lighting):
         """Return the macros of a shader that draws shadow catchers."""
         if not has_layer(steps.facts, "shadow_catcher") or not shows_environment(self, steps.facts):
             return {}
-        return {"SHOWS_ENVIRONMENT": 1, **({"BLURRED": 1} if self.backdrop_blur > 0 else {})}
+        blurred = {"BLURRED": 1} if self.backdrop_blur > 0 else {}
+        return {"SHOWS_ENVIRONMENT": 1, **blurred, **({"MIRRORS": 1} if self.mirrors_ground(steps) else {})}
 
     def draw_backdrop(self, steps: Steps, view: Port | None = None) -> None:
         """Show the environment, or the background behind air, where no surface covers the picture.
@@ -420,6 +481,15 @@ class SurfaceLighting(Lighting):
     def transparent_shadows(self, steps: Steps) -> Port:
         """Return the input with the shadow functions for transparent surfaces."""
         return self.blended_lookup if steps.connected(self.blended_lookup) else self.lookup
+
+
+def _mirrored_objects(facts: Facts) -> list[str]:
+    """Return the names of the opaque objects that stand on a ground."""
+    return [
+        one.name
+        for one in facts.objects
+        if not one.hidden and not one.blended and not transmits(one) and "shadow_catcher" not in one.layers
+    ]
 
 
 def shows_environment(node: SurfaceLighting, facts: Facts) -> bool:

@@ -555,12 +555,13 @@ def match_scene_and_size(pipelines: Sequence[Pipeline]) -> tuple[list[Pipeline],
             pipeline.with_scene(changed or first.scene or "") if spec in strange or changed is None else pipeline
             for pipeline, spec in zip(pipelines, specs, strict=True)
         ]
-    width, height = first.size
-    others = [spec.name for spec in specs if spec.size != first.size]
+    sizes = [pipeline.link().spec.size for pipeline in pipelines]
+    width, height = sizes[0]
+    others = [spec.name for spec, size in zip(specs, sizes, strict=True) if size != sizes[0]]
     notes += [f"'{name}' is rendered at the size of '{first.name}': {width}×{height}" for name in others]
     return [
-        pipeline.with_size(first.size) if spec.size != first.size else pipeline
-        for pipeline, spec in zip(pipelines, specs, strict=True)
+        pipeline.with_size(sizes[0]) if size != sizes[0] else pipeline
+        for pipeline, size in zip(pipelines, sizes, strict=True)
     ], notes
 
 

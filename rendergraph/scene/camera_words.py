@@ -50,6 +50,7 @@ def described_camera(text: str, other: Camera) -> Camera:
         "near": other.near,
         "far": other.far,
         "shutter": other.shutter,
+        "aspect": other.aspect,
     }
     if values.keys().isdisjoint(("fov_y_degrees", "height", "frustum")):
         kind = {"perspective": "fov_y_degrees", "orthographic": "height", "frustum": "frustum"}[other.type]

@@ -331,6 +331,7 @@ class Camera(Struct, frozen=True, eq=False):
         near, far: metres; far may be infinite for perspective.
         target: the point it was aimed at, for orbits; None where unknown.
         shutter: how much of a frame's time it is open, centred on the frame's moment.
+        aspect: width over height of a picture whose size nothing says.
     """
 
     name: str
@@ -344,6 +345,7 @@ class Camera(Struct, frozen=True, eq=False):
     target: Vec3 | None = None
     extra: Extra = NO_EXTRA
     shutter: float = 0.0
+    aspect: float | None = None
 
 
 class Environment(Struct, frozen=True):

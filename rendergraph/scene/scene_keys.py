@@ -248,6 +248,11 @@ CAMERA = Table(
         Key("fov_y_degrees", number(0.01, 179), "Vertical angle of a perspective camera.", 45.0, "°"),
         Key("height", LENGTH, "Height of what an orthographic camera sees; makes it orthographic.", None, "m"),
         Key("frustum", vector(4), "Left, right, bottom, top at the near plane; makes it off-centre.", None, "m"),
+        Key(
+            "aspect",
+            number(0.01, 100),
+            "Width over height of the picture, where neither the pipeline nor the command line says its size.",
+        ),
         Key("near", LENGTH, "Near plane.", 0.05, "m"),
         Key("far", number(0, above=True, infinite=True), "Far plane; `.inf` for none.", 100.0, "m"),
         _unit("shutter", "How much of a frame's time it is open, for motion blur.", 0.0),

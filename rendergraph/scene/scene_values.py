@@ -82,6 +82,7 @@ def camera(name: str, values: Mapping[str, Any], followed: Vec3 | None = None) -
         target,
         values.get("extra", NO_EXTRA),
         values.get("shutter", 0.0),
+        values.get("aspect"),
     )
 
 

@@ -72,7 +72,7 @@ ivec3 scene_triangle(int instance, int triangle) {
     return i.base_vertex + ivec3(scene_indices[first], scene_indices[first + 1], scene_indices[first + 2]);
 }
 
-// Floats of a vertex from an even one on.
+// Four floats of a `vertex`, from the even number `first` on.
 vec4 scene_vertex_floats(int vertex, int first) {
     int row = vertex * SCENE_VERTEX_ROWS + first / 4;
     vec4 floats = texelFetch(scene_vertex_texels, row);

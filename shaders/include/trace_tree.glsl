@@ -1,99 +1,14 @@
-// Rays through the trees over objects and triangles. `trace.glsl` has the questions that are asked of them, and
-// `rendergraph/scene/tree_data.py` describes the buffer.
-#include <scene.glsl>
-
-uniform isamplerBuffer scene_tree;
-#define SCENE_TREE(row) texelFetch(scene_tree, row)
-
-struct Hit {
-    float distance;     // along the direction, in its lengths
-    int instance;
-    int triangle;       // number within the mesh
-    vec2 barycentrics;  // weights of the second and third vertex
-};
-
-const int TRACE_UP = 0x7ffffffe;   // on the stack: back from a mesh to the tree over objects
-const int TRACE_END = 0x7fffffff;  // nothing is left
-
-// 1 / d for each component of `d`, and a large number of its sign where it is almost 0.
-vec3 trace_inverse(vec3 d) {
-    vec3 least = mix(vec3(1e-30), vec3(-1e-30), lessThan(d, vec3(0.0)));
-    return 1.0 / mix(d, least, lessThan(abs(d), vec3(1e-30)));
-}
+// Rays through the trees over objects and triangles. `trace.glsl` has the questions that are asked of them.
+#include <ray_query.glsl>
 
 // The axes in an order that ends with `last`, without mirroring.
 vec3 trace_permuted(vec3 v, int last) {
     return last == 2 ? v : last == 0 ? v.yzx : v.zxy;
 }
 
-int trace_stack[TRACE_STACK];  // of the search that goes on; in a structure it would be copied with each call
-
-// A search along a ray, as in other interfaces for ray queries: it stops at candidates, hits of triangles with a flag of
-// `asks`, for the caller to accept or to leave out. All other hits are accepted at once. An invocation has one search at
-// a time.
-struct RayQuery {
-    Hit hit;        // the nearest that is accepted, or the first with `any`; its instance is -1 if there is none
-    Hit candidate;  // where the search has stopped
-    vec3 origin;
-    vec3 direction;
-    float nearest;
-    float reach;    // the distance beyond which nothing counts any more
-    int wanted;     // flags of what is met: all of them
-    int rejected;   // and none of these
-    int asks;
-    bool any;       // the search ends at the first hit that is accepted
-    // Where the search is: the node, the stack of those to come, and the ray on the grid of the tree and in the object.
-    int node;
-    int top;
-    bool in_mesh;
-    vec3 grid_origin;
-    vec3 inverse;
-    vec3 object_origin;
-    vec3 shear;
-    int axis;
-    int instance;
-    int flags;
-};
-
-// A search between two distances, both exclusive, for what has all flags in `wanted` and none in `rejected`.
-RayQuery ray_query(
-    vec3 origin, vec3 direction, float nearest, float farthest, int wanted, int rejected, int asks, bool any) {
-    RayQuery q;
-    q.hit = q.candidate = Hit(farthest, -1, -1, vec2(0.0));
-    q.origin = origin;
-    q.direction = direction;
-    q.nearest = nearest;
-    q.reach = farthest;
-    q.wanted = wanted;
-    q.rejected = rejected;
-    q.asks = asks;
-    q.any = any;
-    ivec4 header = SCENE_TREE(0), header2 = SCENE_TREE(1);
-    // Invocations outside a triangle that run along in a fragment shader may read 0 everywhere, and then their rays are
-    // not numbers, which enter every box.
-    bool is_ray = dot(abs(origin) + abs(direction), vec3(1.0)) < 1e30;
-    q.node = header2.w > 0 && is_ray ? header.w : TRACE_END;
-    trace_stack[0] = TRACE_END;
-    q.top = 1;
-    q.in_mesh = false;
-    q.grid_origin = (origin - intBitsToFloat(header.xyz)) * intBitsToFloat(header2.xyz);
-    q.inverse = trace_inverse(direction * intBitsToFloat(header2.xyz));
-    q.object_origin = q.shear = vec3(0.0);
-    q.axis = q.flags = 0;
-    q.instance = -1;
-    return q;
-}
-
-// Accepts the candidate.
-void accept_candidate(inout RayQuery q) {
-    q.hit = q.candidate;
-    q.reach = q.candidate.distance;
-    if (q.any) q.node = TRACE_END;
-}
-
-// Continues the search: true where it has stopped at a candidate, false where it has ended. The triangle test is that of
-// S. Woop, C. Benthin and I. Wald ("Watertight Ray/Triangle Intersection", 2013): no ray passes between two triangles
-// that share an edge.
+// Continues the search `q`: true where it has stopped at a candidate, false where it has ended. The triangle test is
+// that of S. Woop, C. Benthin and I. Wald ("Watertight Ray/Triangle Intersection", 2013): no ray passes between two
+// triangles that share an edge.
 //
 // Each turn of the inner loop visits two nodes and tests a triangle, and invocations leave it only when nothing is left
 // of the tree. Those that a processor runs in lockstep then do the same work most of the time, and the set of those

@@ -18,6 +18,32 @@ uniform vec3 background;
 #define UNSHADOWED_LIGHT(s) unshadowed_light(s, ambient)
 #endif
 
+#ifdef MIRRORS
+uniform sampler2D mirrored;
+uniform sampler2D mirrored_depth;
+
+// What the ground mirrors at a point of it, and in alpha how much of that are objects. The farther away the objects,
+// the more of the picture lies in the cone of directions that a rough ground reflects: that many texels a level has
+// blurred. How far they are is the mean over a ring, so that silhouettes are as soft outside as inside.
+vec4 mirrored_at(Surface s) {
+    View v = mirrored_views[0];
+    vec4 clip = v.view_projection * vec4(s.position, 1.0);
+    vec2 uv = clip.xy / clip.w * 0.5 + 0.5;
+    float here = linear_depth(v, uv, clip.z / clip.w), sum = 0.0, count = 0.0;
+    float widest = s.roughness * s.roughness * v.projection[1][1];  // of the cone, in heights of the picture
+    for (int i = 0; i < 9; ++i) {
+        float angle = 2.0 * PI * float(i) / 8.0;
+        vec2 offset = i == 8 ? vec2(0.0) : 0.25 * widest * vec2(cos(angle) * v.viewport.y / v.viewport.x, sin(angle));
+        float window_depth = textureLod(mirrored_depth, uv + offset, 0.0).r;
+        if (is_nothing(window_depth)) continue;
+        sum += clamp(1.0 - here / linear_depth(v, uv, window_depth), 0.0, 1.0);  // the part behind the mirror
+        count += 1.0;
+    }
+    float texels = widest * v.viewport.y * sum / max(count, 1.0);
+    return textureLod(mirrored, uv, log2(max(texels, 1.0)));
+}
+#endif
+
 // `unshadowed` is the light that it receives where nothing shadows it, as radiance of a white surface.
 void begin_catcher(inout Surface s, vec3 unshadowed) {
     vec3 shown = vec3(1.0);
@@ -40,12 +66,16 @@ void end_catcher(Surface s, float coverage) {
 #ifdef WRITES_DIFFUSE
     diffuse = vec4(background * diffuse.rgb, radiance.a);
 #endif
-#elif defined(HAS_REFLECTIONS)
+#elif defined(HAS_REFLECTIONS) || defined(MIRRORS)
     // What is reflected instead of the environment, whose reflection is in what the catcher shows.
+#ifdef HAS_REFLECTIONS
     vec4 reflected = reflections_at_fragment();
-    vec3 change = reflected.rgb - light_from(reflect(-s.view_dir, s.normal), s.roughness);
-    float weight = catcher_reflectance(s) * reflected.a * coverage;
-    radiance.rgb = clamp(radiance.rgb + change * weight, 0.0, MAX_HALF_FLOAT);
+    reflected.rgb *= reflected.a;
+#else
+    vec4 reflected = mirrored_at(s);
+#endif
+    vec3 change = reflected.rgb - light_from(reflect(-s.view_dir, s.normal), s.roughness) * reflected.a;
+    radiance.rgb = clamp(radiance.rgb + change * (catcher_reflectance(s) * coverage), 0.0, MAX_HALF_FLOAT);
 #endif
 }
 #else

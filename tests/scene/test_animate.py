@@ -198,7 +198,7 @@ def test_a_camera_in_words(tmp_path: Path) -> None:
         "eye=0,0,0 target=0,0,0": "eye and target coincide",
         "fov=wide": "'fov_y_degrees': expected a number",
         "fov=40 height=2": "choose one",
-        "follow=box": "camera 'camera' has no key 'follow'; available: eye, far, fov_y_degrees",
+        "follow=box": "camera 'camera' has no key 'follow'; available: aspect, eye, far, fov_y_degrees",
         "eye=[1": "RG0",
     }.items(),
 )

@@ -208,3 +208,26 @@ def test_reflections_show_the_projected_environment(session: rg.Session, folder:
     projected = points - (0.0, 1.0, 0.0)
     expected = radiance_of(projected / np.linalg.norm(projected, axis=-1, keepdims=True))
     np.testing.assert_allclose(found[checked][:, :3], expected[checked], rtol=0.02)
+
+
+@pytest.mark.parametrize("pipeline", ["forward", "forward-multipass", "shading-gouraud", "deferred"])
+def test_the_ground_mirrors_what_stands_on_it(session: rg.Session, folder: Path, pipeline: str) -> None:
+    """A white wall in place of a black one adds the ground's reflectance for the angle, and only before the wall."""
+    pictures = []
+    for name, color in (("black", 0), ("white", 1)):
+        scene = folder / f"{name}-wall.yaml"
+        scene.write_text(
+            "scene: 1\nobjects: {wall: {shape: box, size: [4, 3, 0.2], at: [0, 1.5, -1], material: flat}}\n"
+            f"materials: {{flat: {{base_color: {color}, unlit: true}}}}\n"
+            "cameras: {main: {eye: [0, 1.5, 5], target: [0, 1.5, 0], fov_y_degrees: 60}}\n"
+            "environment: {file: linear.exr, ground: true}\n"
+        )
+        loaded = rg.load(pipeline, scene=scene, size=(80, 64))
+        pictures.append(np.asarray(session.render(loaded, outputs=["radiance"])["radiance"], np.float64)[..., :3])
+    difference = (pictures[1] - pictures[0]).mean(axis=2)
+    y = (1 - 2 * (np.arange(64) + 0.5) / 64) * np.tan(np.radians(30))
+    rows = slice(51, 60)  # of the ground, 0.4 to 2.6 m from the wall
+    cosine = -y[rows] / np.hypot(1, y[rows])
+    expected = 0.04 + 0.36 * (1 - cosine) ** 5
+    np.testing.assert_allclose(difference[rows, 36:44].mean(axis=1), expected, rtol=0.01)
+    assert np.abs(difference[rows, :8]).max() < 1e-3
