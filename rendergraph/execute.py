@@ -170,7 +170,6 @@ class Runner(Struct, eq=False):
     """Runs an executable frame by frame.
 
     Attributes:
-        drawn: frames since history began.
         reuse: leave out steps whose values are there and would be the same.
         cull: leave out objects that lie outside of the views that they would be drawn with.
         ran: how many steps the last frame ran.
@@ -183,14 +182,13 @@ class Runner(Struct, eq=False):
     ran: int = 0
     _updating: list[GraphNode] = field(default_factory=list)
     _scene: FrameScene | None = None
-    _parity: int = 0
     _active: set[str] = field(default_factory=set)
     _complete: bool = False
     _jittering: GraphNode | None = None
     _seen: tuple[Scene, ViewMatrices] | None = None
     _still: int = 0
+    _repeats: bool = False
     _time: float = 0.0
-    drawn: int = 0
 
     def __post_init__(self) -> None:
         active = {step.node for step in self.executable.plan.schedule.steps}
@@ -214,10 +212,21 @@ class Runner(Struct, eq=False):
         """The node that moves the camera's picture from frame to frame."""
         return self._jittering.id if self._jittering is not None else None
 
+    @property
+    def drawn(self) -> int:
+        """How many frames have been drawn since history began."""
+        return self.executable.drawn
+
     def reset(self) -> None:
-        """Start history afresh: all of it holds the port's first value."""
-        self.drawn, self._seen = 0, None
+        """Start history afresh: all of it holds the port's first value.
+
+        After a single frame one of its two textures still does: the next frame is drawn with the same one.
+        """
+        self._repeats = self.drawn == 1 or (self._repeats and not self.drawn)
+        self.executable.drawn, self._seen = 0, None
         self.executable.reset_updates()
+        if self._repeats:
+            return
         memory, plan = self.executable.memory, self.executable.plan
         for name, places in plan.placement.items():
             resource = plan.resources[name]
@@ -280,7 +289,7 @@ class Runner(Struct, eq=False):
             self._check_views()
         if not self.drawn:
             views.advance()  # nothing has moved before the first frame
-        self.drawn += moment == moments - 1
+        executable.drawn += moment == moments - 1
         if views.changed or moved:
             executable.cull_and_sort(moved=moved, cull=self.cull)
             executable.touched |= {("view", table) for table in views.changed}
@@ -292,11 +301,14 @@ class Runner(Struct, eq=False):
         if fresh:
             self.activate()
         # Counted by frames drawn, not by their numbers.
-        parity = self._parity = (self._parity + (not moment)) % len(executable.steps)
+        if not (self._repeats or moment):
+            executable.parity = (executable.parity + 1) % len(executable.steps)
+        parity = executable.parity
         if fresh or len(executable.binds) > 1:  # else everything is still bound from the frame before
             for call in executable.binds[parity]:
                 call()
-        listed = executable.steps_for_frame(parity, reuse=self.reuse and moments == 1)
+        listed = executable.steps_for_frame(parity, reuse=self.reuse and moments == 1, repeats=self._repeats)
+        self._repeats = self._repeats and moment < moments - 1
         if moments > 1:
             listed = self._with_means(parity, moment, moments)
         self.ran = len(listed)
@@ -402,8 +414,8 @@ class Runner(Struct, eq=False):
         desc = executable.plan.resources[resource].desc
         if isinstance(desc, BufferDesc):
             executable.device.ctx.finish()
-            return np.frombuffer(executable.memory.buffer(resource, self._parity).read(desc.bytes), np.uint8)
-        texture = executable.memory.texture(resource, self._parity)
+            return np.frombuffer(executable.memory.buffer(resource, self.executable.parity).read(desc.bytes), np.uint8)
+        texture = executable.memory.texture(resource, self.executable.parity)
         texels = textures.read(executable.device, texture, mip=mip, layer=layer, stencil=stencil)
         return texels[0] if desc.kind == "texture2d" or layer is not None else texels
 

@@ -157,6 +157,8 @@ class Executable(Struct, eq=False, dict=True):
         buffers: draw commands.
         uploads: values that the CPU gives textures and buffers, by the steps that upload them.
         vertex_arrays: frees the vertex arrays over the plan's own buffers.
+        drawn: frames since history began; 0 also where that is gone.
+        parity: of the two textures of each history, the one that the last frame wrote.
         fresh: `statics` have to be written and everything bound before the next frame.
         uses_previous: a program looks at where things were in the frame before.
         shares_kept: what they make may be taken over from other pipelines, and by those.
@@ -180,6 +182,8 @@ class Executable(Struct, eq=False, dict=True):
     uploads: Mapping[StepKey, UploadedValues] = field(default_factory=dict)
     vertex_arrays: Call = bool
     fresh: bool = True
+    drawn: int = 0
+    parity: int = 0
     uses_previous: bool = False
     has_new_kept: bool = False
     shares_kept: bool = True
@@ -312,7 +316,7 @@ class Executable(Struct, eq=False, dict=True):
 
     def mark_stale(self) -> None:
         """Another executable has drawn meanwhile: shared programs hold its uniforms, shared textures its texels."""
-        self.fresh = True
+        self.fresh, self.drawn = True, 0
         self.reuse.forget()
 
     def abort(self) -> None:
@@ -321,8 +325,11 @@ class Executable(Struct, eq=False, dict=True):
             query.abort()
         self.fresh = True
 
-    def steps_for_frame(self, parity: int, *, reuse: bool) -> list[FrameStep]:
-        """What a frame runs: all steps, or with `reuse` those whose values are gone or out of date."""
+    def steps_for_frame(self, parity: int, *, reuse: bool, repeats: bool = False) -> list[FrameStep]:
+        """What a frame runs: all steps, or with `reuse` those whose values are gone or out of date.
+
+        `repeats` says that it is drawn with the same history as the frame before, and in its place.
+        """
         changes = self.scene.changes
         if changes != self.changes_seen:
             changed = {name for name, count in changes.items() if self.changes_seen.get(name, 0) != count}
@@ -334,7 +341,7 @@ class Executable(Struct, eq=False, dict=True):
         if not reuse or self.due or self._running:  # or the last frame was broken off
             self.reuse.forget()
         self._running = True
-        positions = self.reuse.choose(frozenset(self.touched))
+        positions = self.reuse.choose(frozenset(self.touched), repeats)
         self.touched.clear()
         if positions is None:
             return self.lists[parity]

@@ -54,23 +54,24 @@ class Reuse(Struct, eq=False, dict=True):
     step_sources: Callable[[], Sequence[frozenset[Source]]]
     _state: _State | None = None
     _complete: bool = False
-    _known: dict[tuple[_State, frozenset[Source]], tuple[tuple[int, ...], _State]] = field(default_factory=dict)
+    _known: dict[tuple[_State, frozenset[Source], bool], tuple[tuple[int, ...], _State]] = field(default_factory=dict)
 
     def forget(self) -> None:
         """Nothing is there any more."""
         self._state, self._complete = None, False
 
-    def choose(self, changed: frozenset[Source]) -> tuple[int, ...] | None:
+    def choose(self, changed: frozenset[Source], repeats: bool = False) -> tuple[int, ...] | None:
         """The positions of the steps that the next frame runs, in order, except for kept values; None for all steps.
 
-        `changed` are the sources that have changed since the last frame was chosen.
+        `changed` are the sources that have changed since the last frame was chosen. A frame that `repeats` that one
+        finds the same in history, and leaves its own history where that one has.
         """
         if not self._complete:
             self._state, self._complete = None, True
             return None
         if self._state is None:  # all has run once; what that leaves is asked for now that there is a second frame
             self._state = frozenset(self._missing(set(range(len(self._step_states))), {})[1].items())
-        key = self._state, changed
+        key = self._state, changed, repeats
         if key not in self._known:
             if len(self._known) >= _MOST_KNOWN:
                 self._known.clear()
@@ -78,11 +79,13 @@ class Reuse(Struct, eq=False, dict=True):
         positions, self._state = self._known[key]
         return positions
 
-    def _chosen(self, state: _State, changed: frozenset[Source]) -> tuple[tuple[int, ...], _State]:
-        stale = self._stale(changed)
+    def _chosen(self, state: _State, changed: frozenset[Source], repeats: bool) -> tuple[tuple[int, ...], _State]:
+        stale = self._stale(changed, self._refilled if repeats else self._refilled | self._looking_back)
         held: dict[_Slot, Value] = {
-            slot: value for slot, value in state if isinstance(slot, int) and self._makers[value] not in stale
-        }  # a history's two textures have changed places
+            slot: value
+            for slot, value in state
+            if (repeats or isinstance(slot, int)) and self._makers[value] not in stale
+        }  # a history's two textures have changed places unless the frame repeats the one before
         run = self._back_from_goals(held)
         while True:
             missing, after = self._missing(run, held)
@@ -113,11 +116,11 @@ class Reuse(Struct, eq=False, dict=True):
             now.update(touched.leaves)
         return [(slot, value) for slot, value in self._goals if now.get(slot) != value], now
 
-    def _stale(self, changed: frozenset[Source]) -> set[int]:
-        """The steps whose values are no longer what they would make."""
+    def _stale(self, changed: frozenset[Source], always: set[int]) -> set[int]:
+        """The steps whose values are no longer what they would make; those in `always` see others in each frame."""
         stale: set[int] = set()
         for position, touched in enumerate(self._step_states):
-            again = position in self._always or not changed.isdisjoint(self._sources[position])
+            again = position in always or not changed.isdisjoint(self._sources[position])
             if again or any(self._makers[value] in stale for _, value in touched.needs):
                 stale.add(position)
         return stale
@@ -147,8 +150,14 @@ class Reuse(Struct, eq=False, dict=True):
         return [self._at(id, last) for id in sorted(shown) if (last := self._last(id)) is not None and self._moves(id)]
 
     @cached_property
-    def _always(self) -> set[int]:
-        """Steps that see other values in each frame: history, buffers that the CPU fills before steps write them."""
+    def _looking_back(self) -> set[int]:
+        """Steps that read history."""
+        steps = enumerate(self.plan.schedule.steps)
+        return {at for at, step in steps if any(read.previous for read in step.all_reads)}
+
+    @cached_property
+    def _refilled(self) -> set[int]:
+        """Steps that touch buffers which the CPU fills before steps write them."""
         filled = {
             id
             for id in self._versions.writers
@@ -157,7 +166,7 @@ class Reuse(Struct, eq=False, dict=True):
         return {
             at
             for at, step in enumerate(self.plan.schedule.steps)
-            if any(read.previous or read.resource in filled for read in step.all_reads)
+            if any(read.resource in filled for read in step.all_reads)
             or any(write.resource in filled for write in step.writes)
         }
 

@@ -49,6 +49,7 @@ class Drawing(Struct, eq=False, dict=True):
     number: int = 0
     camera: Camera | None = None
     _held: tuple[float, Scene] | None = None
+    _set_values: dict[tuple[str, str], Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         options = self.expanded.options
@@ -68,6 +69,7 @@ class Drawing(Struct, eq=False, dict=True):
             self._draw(options.frames[0])
             self.gpu.device.ctx.finish()
             self.executable.reuse.forget()  # every measured step must run
+        self._set_values.clear()
         self.runner.reset()
         self.times, self.number = [], 0 if lead is None else max(0, options.frames[0] - lead - 1)
 
@@ -84,7 +86,10 @@ class Drawing(Struct, eq=False, dict=True):
             converted = parameter.convert(value)
         except (TypeError, ValueError):
             return False
-        return bool(self.executable.cells(node, name)) and self.executable.set_uniform(node, name, converted) is None
+        if not self.executable.cells(node, name) or self.executable.set_uniform(node, name, converted) is not None:
+            return False
+        self._set_values[node, name] = converted
+        return True
 
     def draw(self, number: int, camera: Camera | None = None) -> None:
         """Render a frame, with the scene as it is at its time.
@@ -104,7 +109,9 @@ class Drawing(Struct, eq=False, dict=True):
             raise RenderError(Problem("RG615", text))
         if self._remembers and camera is None:
             if number <= self.number:
-                self.runner.reset()
+                self.runner.reset()  # of uniforms, too
+                for (node, name), value in self._set_values.items():
+                    self.executable.set_uniform(node, name, value)
                 self.number = 0
             begin = self.number + 1 if self._lead is None else max(self.number + 1, number - self._lead)
             for earlier in range(begin, number):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import rendergraph as rg
+from rendergraph.compare.prepare import match_scene_and_size
 from rendergraph.errors import InputError
 from rendergraph.scene.model import Scene
 
@@ -132,3 +134,28 @@ def test_scene_camera_and_environment_are_settings_too(base: Path) -> None:
 def test_a_mapping_for_a_scene_has_the_keys_of_scene_files() -> None:
     with pytest.raises(InputError, match="RG320 a scene file has no key 'file'"):
         rg.load({"extends": "forward", "scene": {"file": "a.glb"}}).check()
+
+
+@pytest.mark.parametrize(
+    ("size", "keywords", "expected"),
+    [
+        ("", {}, (720, 720)),
+        ("size: [64, 36]\n", {}, (64, 36)),
+        ("", {"size": (48, 32)}, (48, 32)),
+        ("", {"camera": "eye=0,1,3"}, (720, 720)),
+    ],
+)
+def test_a_camera_has_the_shape_of_pictures_whose_size_nothing_says(
+    tmp_path: Path, size: str, keywords: dict[str, Any], expected: tuple[int, int]
+) -> None:
+    file = tmp_path / "file.yaml"
+    file.write_text(f"rendergraph: 1\nextends: deferred\nscene: cornell_box\n{size}")
+    assert rg.load(file, **keywords).link().graph.size == expected
+
+
+def test_pipelines_are_compared_at_the_first_ones_shape(tmp_path: Path) -> None:
+    wide = tmp_path / "wide.yaml"
+    wide.write_text("rendergraph: 1\nextends: deferred\nscene: cornell_box\nsize: [1280, 720]\n")
+    pipelines, notes = match_scene_and_size([rg.load("deferred", scene="cornell_box"), rg.load(wide)])
+    assert [pipeline.link().graph.size for pipeline in pipelines] == [(720, 720), (720, 720)]
+    assert notes == ["'wide' is rendered at the size of 'deferred': 720×720"]

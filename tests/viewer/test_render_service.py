@@ -65,12 +65,21 @@ def test_the_description_comes_once_a_change(service: RenderService) -> None:
     assert changed.facts["pipeline"]["nodes"]["light"]["parameters"]["ambient"]["value"] == 0.5
 
 
-def test_a_slider_runs_nothing_before_what_it_changes(service: RenderService) -> None:
-    selection = rg.Selection("ssao-hemisphere", size=SIZE)
+@pytest.mark.parametrize(
+    ("pipeline", "setting", "runs"),
+    [
+        ("ssao-hemisphere", "ao.radius=0.3", {"ao", "light", "display"}),
+        ("full", "display.exposure=1", {"display", "aa"}),  # not `exposure`, which remembers the frame before
+    ],
+)
+def test_a_slider_runs_nothing_before_what_it_changes(
+    service: RenderService, pipeline: str, setting: str, runs: set[str]
+) -> None:
+    selection = rg.Selection(pipeline, size=SIZE)
     service.answer(RenderRequest(selection))
-    passes = service.answer(RenderRequest(replace(selection, sets=("ao.radius=0.3",)))).facts["passes"]
+    passes = service.answer(RenderRequest(replace(selection, sets=(setting,)))).facts["passes"]
     ran = {entry["node"]: entry["ran"] for entry in passes}
-    assert {node for node in ran if ran[node]} == {"ao", "light", "display"}
+    assert {node for node in ran if ran[node]} == runs
     assert {"gbuffer", "sun", "shadows"} < ran.keys()  # with the times that they took
 
 
@@ -206,16 +215,27 @@ def test_exposure_is_of_light_alone(service: RenderService, tmp_path: Path) -> N
     np.testing.assert_array_equal(picture(service.answer(RenderRequest(FORWARD, exposure=2.0)), tmp_path), image)
 
 
-@pytest.mark.parametrize("path", ["display.exposure", "light.ambient", "shadows.bias", "light.terms", "display.curve"])
-def test_a_value_that_slides_is_drawn_as_if_it_were_linked(gl: rg.Session, tmp_path: Path, path: str) -> None:
+@pytest.mark.parametrize(
+    ("pipeline", "path"),
+    [
+        *(("forward", path) for path in ("display.exposure", "light.ambient", "shadows.bias", "light.terms")),
+        ("forward", "display.curve"),
+        ("full", "display.exposure"),
+        ("full", "bloom.intensity"),
+    ],
+)
+def test_a_value_that_slides_is_drawn_as_if_it_were_linked(
+    gl: rg.Session, tmp_path: Path, pipeline: str, path: str
+) -> None:
     """Moving pictures set the uniform of the last one; those of other values, and still ones, come from the pipeline."""
     service = RenderService(gl, interactive_ms=1e9)  # never smaller
     values = {"light.terms": ["all", "diffuse"], "display.curve": ["aces", "none"]}.get(path, [0.02, 0.3])
-    chosen = [replace(FORWARD, sets=(f"{path}={value}",)) for value in values]
-    still = [picture(service.answer(RenderRequest(each)), tmp_path) for each in (FORWARD, *chosen)]
-    service.answer(RenderRequest(FORWARD, still=False))
+    plain = rg.Selection(pipeline, size=SIZE)
+    chosen = [replace(plain, sets=(f"{path}={value}",)) for value in values]
+    still = [picture(service.answer(RenderRequest(each)), tmp_path) for each in (plain, *chosen)]
+    service.answer(RenderRequest(plain, still=False))
     seen = []
-    for each in (*chosen, FORWARD, chosen[0]):
+    for each in (*chosen, plain, chosen[0]):
         answer = service.answer(RenderRequest(each, still=False))
         assert not answer.problems
         assert service._rendered is not None
@@ -223,4 +243,6 @@ def test_a_value_that_slides_is_drawn_as_if_it_were_linked(gl: rg.Session, tmp_p
     for found, expected in zip(seen, (still[1], still[2], still[0], still[1]), strict=True):
         np.testing.assert_array_equal(found, expected[..., :3])
     np.testing.assert_array_equal(picture(service.answer(RenderRequest(chosen[0])), tmp_path), still[1])
-    np.testing.assert_array_equal(picture(service.answer(RenderRequest(FORWARD)), tmp_path), still[0])
+    np.testing.assert_array_equal(picture(service.answer(RenderRequest(plain)), tmp_path), still[0])
+    if path in ("display.exposure", "bloom.intensity"):
+        assert np.abs(still[1].astype(int) - still[2]).max() > 0
