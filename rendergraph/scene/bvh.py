@@ -29,7 +29,7 @@ _BATCH = 1 << 14  # primitives that are split together: their boxes and bins fit
 _BINS, _FEW_BINS = 16, 8
 _FEW = 6  # primitives a node
 _SAMPLING, _ENOUGH = 8, 512  # every eighth primitive of nodes that have more than 8 times 512
-_STEP_COST = 1.0  # of visiting a node, in tests of a primitive
+_STEP_COST = 0.5  # of visiting a node, in tests of a primitive
 
 
 class Tree(Struct, frozen=True, eq=False):
