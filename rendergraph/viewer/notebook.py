@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 from collections.abc import Callable
 from html import escape
 from pathlib import Path
@@ -19,19 +20,25 @@ class Viewer:
     """A page that is served until `close`, or until Python ends.
 
     In a notebook it shows itself; elsewhere open `url` in a browser: whoever has it may use the page. It has a render
-    process of its own, which shares nothing with a `Session` of this process.
+    process of its own, which shares nothing with a `Session` of this process. Changes that were not saved on the page
+    are written to `NAME-unsaved.yaml` in the end.
     """
 
-    def __init__(self, url: str, stop: Callable[[], None], height: int) -> None:
+    def __init__(self, url: str, stop: Callable[[], None], keep: Callable[[], Path | None], height: int) -> None:
         self.url = url
         self._stop: Callable[[], None] | None = stop
+        self._keep = keep
         self._height = height
+        atexit.register(keep)
 
-    def close(self) -> None:
-        """End the server and its render process."""
-        if self._stop is not None:
-            self._stop()
-            self._stop = None
+    def close(self) -> Path | None:
+        """End the server and its render process, and return the file of changes that were not saved, if any."""
+        if self._stop is None:
+            return None
+        self._stop()
+        self._stop = None
+        atexit.unregister(self._keep)
+        return self._keep()
 
     def __enter__(self) -> Viewer:
         return self
@@ -75,5 +82,6 @@ def view(
     if against is not None:
         compared = as_pipeline(against)
         other = Path(compared.selection.label).stem, compared.selection
-    server = Server(ViewState(found.selection, Path.cwd(), against=other), RenderProcess(device), port=port)
-    return Viewer(server.url, server.start(), height)
+    state = ViewState(found.selection, Path.cwd(), against=other)
+    server = Server(state, RenderProcess(device), port=port)
+    return Viewer(server.url, server.start(), state.keep, height)

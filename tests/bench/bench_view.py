@@ -6,10 +6,12 @@ time until it comes is held against the frame's own, as the picture says it. The
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import statistics
 import struct
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -26,7 +28,9 @@ import rendergraph as rg
 def main() -> None:
     """Print a line for each kind of change, and one for memory."""
     chosen = options(__doc__, frames=30, width=640, height=360)
-    with rg.view(rg.load("deferred", size=(chosen.width, chosen.height))) as viewer:
+    pipeline = rg.load("deferred", size=(chosen.width, chosen.height))
+    # What is not saved is kept in the folder.
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), rg.view(pipeline) as viewer:
         place = urlsplit(viewer.url)
         origin = Origin(f"http://{place.netloc}")
         with connect(f"ws://{place.netloc}{place.path}socket", origin=origin, max_size=None, proxy=None) as socket:

@@ -15,6 +15,7 @@ from rendergraph.errors import RendergraphError, UsageError
 from rendergraph.images import read
 from rendergraph.viewer import editing, messages
 from rendergraph.viewer.messages import RenderRequest, parse_message
+from rendergraph.viewer.notebook import Viewer
 from rendergraph.viewer.render_service import RenderService
 from rendergraph.viewer.view_state import ViewState
 
@@ -168,6 +169,15 @@ def test_the_end_of_the_server_keeps_what_was_not_saved(state: ViewState, folder
     insert_bloom(state)
     assert state.keep() == folder / "mine-unsaved.yaml"
     assert state.keep() == folder / "mine-unsaved1.yaml"
+
+
+def test_closing_a_page_in_python_keeps_it_once(state: ViewState, folder: Path) -> None:
+    stopped: list[str] = []
+    viewer = Viewer("http://127.0.0.1/", lambda: stopped.append("stopped"), state.keep, 720)
+    insert_bloom(state)
+    assert viewer.close() == folder / "mine-unsaved.yaml"
+    assert viewer.close() is None
+    assert stopped == ["stopped"]
 
 
 @pytest.mark.parametrize(
