@@ -11,9 +11,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import rendergraph as rg
+from rendergraph.scene.camera_words import keys_of
+from rendergraph.viewer.view_state import CAMERA
 
 pytestmark = pytest.mark.slow
 SIZE = (64, 36)
@@ -686,3 +689,70 @@ def test_what_a_file_inherits_is_one_card_for_each_file(show: Callable[..., Hand
     hand.page.keyboard.press("Enter")
     hand.page.wait_for_selector(".card[data-node=sun]")
     assert hand.page.get_attribute("#inherited", "aria-pressed") == "false"
+
+
+class Fingers:
+    """Touches of a page on a phone, in CSS pixels."""
+
+    def __init__(self, page: Any) -> None:
+        self.page, self.device = page, page.context.new_cdp_session(page)
+
+    def move(self, *ways: tuple[tuple[float, float], tuple[float, float]], steps: int = 8) -> None:
+        """Put a finger down at the beginning of each way, move all together, and lift them."""
+        for number in range(steps + 1):
+            share = number / steps
+            at = [
+                {"x": a[0] + share * (b[0] - a[0]), "y": a[1] + share * (b[1] - a[1]), "id": n}
+                for n, (a, b) in enumerate(ways)
+            ]
+            kind = "touchMove" if number else "touchStart"
+            self.device.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": at})
+            time.sleep(0.02)
+        self.device.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+
+    def middle(self, selector: str) -> tuple[float, float]:
+        self.page.locator(selector).scroll_into_view_if_needed()
+        box = self.page.locator(selector).bounding_box()
+        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def test_a_phone_turns_pinches_slides_and_taps(browser: Any, served: Any) -> None:
+    served.reset(rg.Selection("forward", size=SIZE))
+    context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    try:
+        page = context.new_page()
+        hand, fingers = Hand(page), Fingers(page)
+        hand.open(served.url)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+        def camera() -> tuple[Any, float]:
+            """The direction from what the camera turns around to the eye, and the distance."""
+            keys = keys_of(served.state.edits.current[CAMERA])
+            away = np.subtract(keys["eye"], keys["target"])
+            return away / np.linalg.norm(away), float(np.linalg.norm(away))
+
+        x, y = fingers.middle("#stage")
+        hand.after(lambda: fingers.move(((x, y), (x + 20, y))))
+        before, distance = camera()
+        assert distance > 3
+        hand.after(lambda: fingers.move(((x - 30, y), (x + 30, y))))
+        turned, same = camera()
+        assert np.degrees(np.arccos(before @ turned)) > 5
+        assert same == pytest.approx(distance)
+        hand.after(lambda: fingers.move(((x - 30, y), (x - 60, y)), ((x + 30, y), (x + 60, y))))
+        pinched, near = camera()
+        assert near == pytest.approx(distance / 2, rel=0.05)
+        assert turned @ pinched == pytest.approx(1, abs=1e-4)  # it does not turn meanwhile
+
+        page.tap("#graph .card[aria-label^='display:']", position={"x": 30, "y": 14})
+        hand.until("document.getElementById('node').value === 'display'")
+        slider = "[aria-label='display.exposure, slider']"
+        at = fingers.middle(slider)
+        hand.after(lambda: fingers.move((at, (at[0] + 30, at[1]))))
+        assert float(page.input_value("[id='p-display.exposure']")) > 0
+        hand.after(lambda: page.tap("#undo"))
+        assert float(page.input_value("[id='p-display.exposure']")) == 0
+        hand.close()
+        assert hand.wrong == []
+    finally:
+        context.close()
