@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,8 @@ def ask(made: Any, *calls: tuple[str, dict[str, Any]]) -> list[Any]:
             assert {"nodes", "explain", "check", "plan", "run", "compare", "texture"} <= tools
             return [await client.call_tool(name, arguments) for name, arguments in calls]
 
-    return asyncio.run(asked())
+    with ThreadPoolExecutor(1) as thread:  # a browser that other tests have opened runs a loop in this one
+        return thread.submit(asyncio.run, asked()).result()
 
 
 @pytest.fixture
