@@ -181,6 +181,7 @@ class Runner(Struct, eq=False):
     cull: bool = True
     ran: int = 0
     _updating: list[GraphNode] = field(default_factory=list)
+    _computed: dict[str, list[tuple[Views, Callable[[Any], Sequence[ViewMatrices]]]]] = field(default_factory=dict)
     _scene: FrameScene | None = None
     _active: set[str] = field(default_factory=set)
     _complete: bool = False
@@ -198,14 +199,29 @@ class Runner(Struct, eq=False):
             if node.id in active:  # it may ask for the views of what it reads
                 active |= set(_view_makers(self.graph, node))
         self._active = active
-        self._updating = [node for node in nodes if node.id in active and type(node.node).update is not Node.update]
+        self._computed = {node.id: found for node in nodes if (found := self._computed_views(node))}
+        self._updating = [
+            node
+            for node in nodes
+            if node.id in active and (type(node.node).update is not Node.update or node.id in self._computed)
+        ]
         jittering = (n for n in nodes if type(n.node).camera_jitter is not Node.camera_jitter)
         self._jittering = next((node for node in jittering if node.id in active), None)
         self.reset()
 
     @property
     def updating(self) -> list[str]:
-        return [node.id for node in self._updating]
+        return [node.id for node in self._updating if type(node.node).update is not Node.update]
+
+    def _computed_views(self, node: GraphNode) -> list[tuple[Views, Callable[[Any], Sequence[ViewMatrices]]]]:
+        """The tables of a node that have views, and the functions that compute them."""
+        tables, ports = self.executable.views.tables, node.node.ports().values()
+        return [
+            (port, port.compute)
+            for port in ports
+            if isinstance(port, Views) and port.compute is not None
+            if (table := tables.get(f"{node.id}.{port.name}")) is not None and table.count
+        ]
 
     @property
     def jittering(self) -> str | None:
@@ -275,6 +291,8 @@ class Runner(Struct, eq=False):
             frame = FrameContext(executable, self.graph, node, index, time, camera, self._scene, has_moved, first)
             with _author_errors(node, "update"):
                 node.node.update(frame)  # pyright: ignore[reportArgumentType]  # a cached_property is one to mypy
+                for port, compute in self._computed.get(node.id, ()):
+                    frame.set_views(port, compute(frame))
             updates[node.id] = perf_counter() - before
         if executable.uploads:
             self._compute_uploads()

@@ -6,7 +6,7 @@ once.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar
 
@@ -266,12 +266,15 @@ class Views(Port, frozen=True, eq=False):
             that texel by texel. The viewport by default.
         lights: the scene's light index of each view, empty if views belong to no lights.
         public: whether others may connect it (it is then an output of kind `view`).
+        compute: function of the `Frame` that returns the views of each frame, in place of `update`. It does not know
+            the node's parameters, so the page of `view` can move those without asking it.
     """
 
     count: Ruled[Count] | None = None
     size: SizeRule | None = None
     lights: Rule[tuple[int, ...]] | None = None
     public: bool = True
+    compute: Callable[[Any], Sequence[Any]] | None = None
     doc: str = ""
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from rendergraph.api import Depth, Facts, Frame, Input, Port, State, Steps, ViewMatrices, param
+from rendergraph.api import Depth, Facts, Input, Port, State, Steps, Views, param
 
 from ..geometry._surface_textures import SURFACE_TEXTURES
-from ._lighting import Color, SurfaceLighting, draws_backdrop
+from ._lighting import Color, SurfaceLighting, draws_backdrop, has_layer
+from ._mirror import mirrored_views
 
 
 def gbuffer_samples(_node: Any, facts: Facts) -> int:
@@ -39,11 +40,15 @@ class ImageLighting(SurfaceLighting):
     phong_specular = SURFACE_TEXTURES["phong_specular"].input()
     phong_ambient = SURFACE_TEXTURES["phong_ambient"].input()
 
-    background: Color = param(default=0.0, min=0, glsl="vec3", doc="Radiance of the background, a number or RGB.")
+    mirror_view = Views(
+        count=lambda node, facts: int(has_layer(facts, "shadow_catcher")),
+        size=0.5,
+        public=False,
+        compute=lambda frame: mirrored_views(frame, frame.views(ImageLighting.depth)[0]),
+        doc="The view that sees what the ground mirrors.",
+    )
 
-    def picture_view(self, frame: Frame) -> ViewMatrices:
-        """Return the view of the G-buffer."""
-        return frame.views(self.depth)[0]
+    background: Color = param(default=0.0, min=0, glsl="vec3", doc="Radiance of the background, a number or RGB.")
 
     def gbuffer_reads(self, steps: Steps) -> dict[str, Any]:
         """Return what `gbuffer_surface.glsl` reads for the node's shading model."""

@@ -12,7 +12,6 @@ from rendergraph.api import (
     Depth,
     EnvironmentLight,
     Facts,
-    Frame,
     Input,
     Internal,
     Irradiance,
@@ -31,7 +30,6 @@ from rendergraph.api import (
     State,
     Steps,
     View,
-    ViewMatrices,
     Views,
     Visibility,
     define,
@@ -40,7 +38,7 @@ from rendergraph.api import (
 )
 
 from ..geometry._samples import Samples
-from ._mirror import mirrored_view
+from ._mirror import mirrored_views
 
 UNDER = Blend("one_minus_dst_alpha", "one")
 Color = float | tuple[float, float, float]
@@ -340,6 +338,7 @@ class SurfaceLighting(Lighting):
         count=lambda node, facts: int(has_layer(facts, "shadow_catcher")),
         size=0.5,
         public=False,
+        compute=lambda frame: mirrored_views(frame, frame.camera),
         doc="The view that sees what the ground mirrors.",
     )
     mirrored = Internal(
@@ -395,16 +394,6 @@ class SurfaceLighting(Lighting):
         for level in range(1, steps.desc(self.mirrored).mips):
             source, target = self.mirrored.mip(level - 1), self.mirrored.mip(level)
             steps.fullscreen("<downsample.frag>", source=source, out=target, label="mirrored")
-
-    def update(self, frame: Frame) -> None:
-        """Set the view that sees what the ground mirrors."""
-        if len(catchers := frame.scene.catchers):
-            height = float(frame.scene.corners[catchers[-1]][:, 1].max())
-            frame.set_views(self.mirror_view, [mirrored_view(self.picture_view(frame), height)])
-
-    def picture_view(self, frame: Frame) -> ViewMatrices:
-        """Return the view of the picture."""
-        return frame.camera
 
     def mirrors_ground(self, steps: Steps) -> bool:
         """Return whether the scene has a ground that mirrors objects, and no `reflections` are connected."""

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from rendergraph.api import ViewMatrices
+from rendergraph.api import Frame, ViewMatrices
+
+
+def mirrored_views(frame: Frame, view: ViewMatrices) -> Sequence[ViewMatrices]:
+    """Return the view that sees what the scene's last shadow catcher mirrors in a picture of this view."""
+    catchers = frame.scene.catchers
+    height = float(frame.scene.corners[catchers[-1]][:, 1].max())
+    return [mirrored_view(view, height)]
 
 
 def mirrored_view(view: ViewMatrices, height: float) -> ViewMatrices:

@@ -322,7 +322,7 @@ class _VersionAssignment:
             if index is not None and index >= max(1, count):
                 text = f"view_index is {index}, but '{port.name}' has {count} views, counted from 0"
                 raise self._refused(recording, request, "RG423", text)
-            if type(recording.node.node).update is Node.update:
+            if type(recording.node.node).update is Node.update and port.compute is None:
                 text = f"it draws with the views of '{port.name}', which nothing sets; set them in `update`"
                 raise self._refused(recording, request, "RG433", text)
             return table, index
