@@ -236,14 +236,17 @@ class Runner(Struct, eq=False):
     def reset(self) -> None:
         """Start history afresh: all of it holds the port's first value.
 
-        After a single frame one of its two textures still does: the next frame is drawn with the same one.
+        After a single frame one of its two textures still does: the next frame is drawn with the same one. A history
+        that is written in place has one alone.
         """
-        self._repeats = self.drawn == 1 or (self._repeats and not self.drawn)
+        memory, plan = self.executable.memory, self.executable.plan
+        placement = plan.placement.items()
+        is_double = all(len(places) == 2 for name, places in placement if plan.resources[name].role == "history")
+        self._repeats = is_double and (self.drawn == 1 or (self._repeats and not self.drawn))
         self.executable.drawn, self._seen = 0, None
         self.executable.reset_updates()
         if self._repeats:
             return
-        memory, plan = self.executable.memory, self.executable.plan
         for name, places in plan.placement.items():
             resource = plan.resources[name]
             for parity in range(len(places)) if resource.role == "history" else ():
