@@ -231,3 +231,25 @@ def test_the_ground_mirrors_what_stands_on_it(session: rg.Session, folder: Path,
     expected = 0.04 + 0.36 * (1 - cosine) ** 5
     np.testing.assert_allclose(difference[rows, 36:44].mean(axis=1), expected, rtol=0.01)
     assert np.abs(difference[rows, :8]).max() < 1e-3
+
+
+@pytest.mark.parametrize("pipeline", ["forward", "deferred"])
+def test_a_mirrored_edge_lies_as_far_below_the_ground(session: rg.Session, folder: Path, pipeline: str) -> None:
+    """The mirror image of a wall ends where a wall would that goes as deep as this one is high."""
+    pictures = []
+    for name, color in (("black", 0), ("white", 1)):
+        scene = folder / f"low-{name}.yaml"
+        scene.write_text(
+            "scene: 1\nobjects: {wall: {shape: box, size: [4, 0.5, 0.2], at: [0, 0.25, -1], material: flat}}\n"
+            f"materials: {{flat: {{base_color: {color}, unlit: true}}}}\n"
+            "cameras: {main: {eye: [0, 1.5, 5], target: [0, 1.5, 0], fov_y_degrees: 60}}\n"
+            "environment: {file: linear.exr, ground: true}\n"
+        )
+        loaded = rg.load(pipeline, scene=scene, size=(64, 256))
+        pictures.append(np.asarray(session.render(loaded, outputs=["radiance"])["radiance"], np.float64)[..., :3])
+    difference = (pictures[1] - pictures[0])[:, 32].mean(axis=1)
+    tall = np.tan(np.radians(30))
+    foot, end = (128 * (1 + y / 5.9 / tall) for y in (1.5, 2.0))  # rows of the ground line and of the mirrored edge
+    below = difference[int(foot) + 2 :]
+    half = int(foot) + 2 + int(np.argmax(below < below[:4].mean() / 2))
+    assert half == pytest.approx(end, abs=1.5)

@@ -572,3 +572,27 @@ def test_interreflection_is_that_of_the_reference(
     own = np.sqrt(variance + (0.004 * expected) ** 2)
     assert (np.abs(found - expected) < 3 * own).mean() > 0.99
     assert abs((found - expected).mean()) < 3 * np.sqrt(variance.sum()) / variance.size + 2e-4 * expected.mean()
+
+
+def test_shadow_rays_meet_all_panes_and_what_is_behind_them(session: rg.Session, tmp_path: Path) -> None:
+    """Under one half-transparent pane, under two, and under one with a plate below: 1/2, 1/4 and 0 of the light."""
+    (tmp_path / "panes.yaml").write_text(
+        "scene: 1\n"
+        "objects:\n"
+        "  floor: {shape: plane, size: [9, 3], material: white}\n"
+        "  upper: {shape: plane, size: [9, 3], at: [0, 2, 0], material: pane}\n"
+        "  lower: {shape: plane, size: [3, 3], at: [0, 1.5, 0], material: pane}\n"
+        "  plate: {shape: plane, size: [3, 3], at: [3, 1, 0], material: white}\n"
+        "materials:\n"
+        "  white: {base_color: 1, specular: 0, roughness: 1, double_sided: true}\n"
+        "  pane: {base_color: [0, 0, 0, 0.5], specular: 0, alpha_mode: blend, double_sided: true}\n"
+        "lights: {sun: {type: directional, direction: [0, -1, 0], intensity: 3}}\n"
+        "cameras: {main: {eye: [0, 0.5, 0.0], target: [0, 0, 0], up: [0, 0, -1], height: 1, near: 0.01, far: 9}}\n"
+    )
+    settings = ["light.samples=4", "light.max_bounces=0", "light.ambient=0"]
+    found = []
+    for x in (-3, 0, 3):
+        camera = f"eye={x},0.5,0 target={x},0,0 up=0,0,-1 height=1 near=0.01 far=9"
+        pipeline = rg.load("path-traced", scene=tmp_path / "panes.yaml", camera=camera, size=(4, 4), sets=settings)
+        found.append(float(np.asarray(session.render(pipeline, outputs=["radiance"])["radiance"])[..., 0].mean()))
+    np.testing.assert_allclose(found, np.array([0.5, 0.25, 0]) * 3 / np.pi, rtol=1e-4, atol=1e-6)
