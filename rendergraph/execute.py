@@ -188,6 +188,7 @@ class Runner(Struct, eq=False):
     _jittering: GraphNode | None = None
     _seen: tuple[Scene, ViewMatrices] | None = None
     _still: int = 0
+    _histories: dict[str, int] = field(default_factory=dict)
     _repeats: bool = False
     _time: float = 0.0
 
@@ -207,6 +208,8 @@ class Runner(Struct, eq=False):
         ]
         jittering = (n for n in nodes if type(n.node).camera_jitter is not Node.camera_jitter)
         self._jittering = next((node for node in jittering if node.id in active), None)
+        plan = self.executable.plan
+        self._histories = {id: len(at) for id, at in plan.placement.items() if plan.resources[id].role == "history"}
         self.reset()
 
     @property
@@ -239,17 +242,16 @@ class Runner(Struct, eq=False):
         After a single frame one of its two textures still does: the next frame is drawn with the same one. A history
         that is written in place has one alone.
         """
-        memory, plan = self.executable.memory, self.executable.plan
-        placement = plan.placement.items()
-        is_double = all(len(places) == 2 for name, places in placement if plan.resources[name].role == "history")
+        is_double = all(count == 2 for count in self._histories.values())
         self._repeats = is_double and (self.drawn == 1 or (self._repeats and not self.drawn))
         self.executable.drawn, self._seen = 0, None
         self.executable.reset_updates()
         if self._repeats:
             return
-        for name, places in plan.placement.items():
-            resource = plan.resources[name]
-            for parity in range(len(places)) if resource.role == "history" else ():
+        memory = self.executable.memory
+        for name, count in self._histories.items():
+            resource = self.executable.plan.resources[name]
+            for parity in range(count):
                 if isinstance(resource.desc, BufferDesc):
                     memory.buffer(name, parity).clear()
                 else:
@@ -324,14 +326,13 @@ class Runner(Struct, eq=False):
         # Counted by frames drawn, not by their numbers.
         if not (self._repeats or moment):
             executable.parity = (executable.parity + 1) % len(executable.steps)
-        parity = executable.parity
         if fresh or len(executable.binds) > 1:  # else everything is still bound from the frame before
-            for call in executable.binds[parity]:
+            for call in executable.binds[executable.parity]:
                 call()
-        listed = executable.steps_for_frame(parity, reuse=self.reuse and moments == 1, repeats=self._repeats)
+        listed = executable.steps_for_frame(reuse=self.reuse and moments == 1, repeats=self._repeats)
         self._repeats = self._repeats and moment < moments - 1
         if moments > 1:
-            listed = self._with_means(parity, moment, moments)
+            listed = self._with_means(moment, moments)
         self.ran = len(listed)
         taken: list[tuple[Step, float, Timer]] = []
         measured = executable.device.can_time
@@ -364,14 +365,14 @@ class Runner(Struct, eq=False):
             steps.append(StepTime(done.node, cpu * 1e3, gpu, done.index, done.label))
         return FrameTimes(frame_ms, tuple(steps), self.ran)
 
-    def _with_means(self, parity: int, moment: int, moments: int) -> list[FrameStep]:
+    def _with_means(self, moment: int, moments: int) -> list[FrameStep]:
         """The steps of a frame that average the light of its moments."""
         executable = self.executable
         if executable.means is None:
             semantics = {str(end): info.semantic for end, info in self.graph.textures.items()}
             executable.means = LightMeans(executable, averaged_textures(executable.plan, semantics))
         executable.means.moment, executable.means.count = moment, moments
-        return executable.steps_with_stops(parity, executable.means.calls(parity))
+        return executable.steps_with_stops(executable.means.calls(executable.parity))
 
     def _compute_uploads(self) -> None:
         executable = self.executable

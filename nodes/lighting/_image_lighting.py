@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from rendergraph.api import Depth, Facts, Input, Port, State, Steps, Views, param
+from rendergraph.api import Depth, Facts, Input, Port, State, Steps, param
 
 from ..geometry._surface_textures import SURFACE_TEXTURES
-from ._lighting import Color, SurfaceLighting, draws_backdrop, has_layer
-from ._mirror import mirrored_views
+from ._lighting import Color, SurfaceLighting, draws_backdrop, mirror_view
 
 
 def gbuffer_samples(_node: Any, facts: Facts) -> int:
@@ -40,13 +39,7 @@ class ImageLighting(SurfaceLighting):
     phong_specular = SURFACE_TEXTURES["phong_specular"].input()
     phong_ambient = SURFACE_TEXTURES["phong_ambient"].input()
 
-    mirror_view = Views(
-        count=lambda node, facts: int(has_layer(facts, "shadow_catcher")),
-        size=0.5,
-        public=False,
-        compute=lambda frame: mirrored_views(frame, frame.views(ImageLighting.depth)[0]),
-        doc="The view that sees what the ground mirrors.",
-    )
+    mirror_view = mirror_view(lambda frame: frame.views(ImageLighting.depth)[0])
 
     background: Color = param(default=0.0, min=0, glsl="vec3", doc="Radiance of the background, a number or RGB.")
 

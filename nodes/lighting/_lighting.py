@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal
 
 from rendergraph.api import (
@@ -12,6 +13,7 @@ from rendergraph.api import (
     Depth,
     EnvironmentLight,
     Facts,
+    Frame,
     Input,
     Internal,
     Irradiance,
@@ -30,6 +32,7 @@ from rendergraph.api import (
     State,
     Steps,
     View,
+    ViewMatrices,
     Views,
     Visibility,
     define,
@@ -37,8 +40,9 @@ from rendergraph.api import (
     structural,
 )
 
+from ..display._mip_means import fill_mips
 from ..geometry._samples import Samples
-from ._mirror import mirrored_views
+from ._mirror import ground_height, mirrored_view
 
 UNDER = Blend("one_minus_dst_alpha", "one")
 Color = float | tuple[float, float, float]
@@ -189,9 +193,7 @@ class Lighting(Node):
     def copy_behind(self, steps: Steps, picture: Port) -> None:
         """Copy the picture to `behind`, with all levels."""
         steps.fullscreen("copy_picture.frag", radiance=picture, out=self.behind.mip(0), label="behind")
-        for level in range(1, steps.desc(self.behind).mips):
-            target = self.behind.mip(level)
-            steps.fullscreen("<downsample.frag>", source=self.behind.mip(level - 1), out=target, label="behind")
+        fill_mips(steps, self.behind, "behind")
 
     def air_reads(self, steps: Steps) -> dict[str, Any]:
         """Return what a shader reads for the air in front of what it draws."""
@@ -299,6 +301,17 @@ def part_samples(node: Node, facts: Facts) -> int:
     return int(_of_radiance(node, facts, "samples", 1))
 
 
+def mirror_view(picture_view: Callable[[Frame], ViewMatrices]) -> Views:
+    """Declare the view that sees what the ground mirrors in a picture of this view."""
+    return Views(
+        count=lambda node, facts: int(has_layer(facts, "shadow_catcher")),
+        size=0.5,
+        public=False,
+        compute=lambda frame: [mirrored_view(picture_view(frame), ground_height(frame))],
+        doc="The view that sees what the ground mirrors.",
+    )
+
+
 def _part(doc: str, semantic: Semantic = Radiance) -> Output:
     return Output(semantic, format=part_format, samples=part_samples, clear=0.0, doc=doc)
 
@@ -334,13 +347,7 @@ class SurfaceLighting(Lighting):
         doc="Shadow functions for transparent surfaces, if opaque ones use `visibility`.",
     )
 
-    mirror_view = Views(
-        count=lambda node, facts: int(has_layer(facts, "shadow_catcher")),
-        size=0.5,
-        public=False,
-        compute=lambda frame: mirrored_views(frame, frame.camera),
-        doc="The view that sees what the ground mirrors.",
-    )
+    mirror_view = mirror_view(lambda frame: frame.camera)
     mirrored = Internal(
         format="rgba16f",
         size=0.5,
@@ -391,9 +398,7 @@ class SurfaceLighting(Lighting):
             label="mirrored",
             **self.lighting_reads(steps, self.transparent_shadows(steps)),
         )
-        for level in range(1, steps.desc(self.mirrored).mips):
-            source, target = self.mirrored.mip(level - 1), self.mirrored.mip(level)
-            steps.fullscreen("<downsample.frag>", source=source, out=target, label="mirrored")
+        fill_mips(steps, self.mirrored, "mirrored")
 
     def mirrors_ground(self, steps: Steps) -> bool:
         """Return whether the scene has a ground that mirrors objects, and no `reflections` are connected."""

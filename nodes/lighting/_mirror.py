@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +9,9 @@ import numpy as np
 from rendergraph.api import Frame, ViewMatrices
 
 
-def mirrored_views(frame: Frame, view: ViewMatrices) -> Sequence[ViewMatrices]:
-    """Return the view that sees what the scene's last shadow catcher mirrors in a picture of this view."""
-    catchers = frame.scene.catchers
-    height = float(frame.scene.corners[catchers[-1]][:, 1].max())
-    return [mirrored_view(view, height)]
+def ground_height(frame: Frame) -> float:
+    """Return y of the ground in metres: the scene's last shadow catcher."""
+    return float(frame.scene.corners[frame.scene.catchers[-1]][:, 1].max())
 
 
 def mirrored_view(view: ViewMatrices, height: float) -> ViewMatrices:

@@ -21,6 +21,8 @@ from rendergraph.api import (
     param,
 )
 
+from ..display._mip_means import fill_mips
+
 
 class SSR(Node):
     """Reflect the lit picture in itself, in place of the environment's reflection.
@@ -63,9 +65,7 @@ class SSR(Node):
         )
         out = self.lit.mip(0)
         steps.fullscreen("ssr_picture.frag", radiance=self.radiance, out={"lit": out}, label="picture", **reads)
-        for level in range(1, steps.desc(self.lit).mips):
-            source, target = self.lit.mip(level - 1), self.lit.mip(level)
-            steps.fullscreen("<downsample.frag>", source=source, out=target, label="picture")
+        fill_mips(steps, self.lit, "picture")
         steps.fullscreen(
             "ssr.frag",
             out={"change": self.radiance},

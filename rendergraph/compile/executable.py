@@ -325,7 +325,7 @@ class Executable(Struct, eq=False, dict=True):
             query.abort()
         self.fresh = True
 
-    def steps_for_frame(self, parity: int, *, reuse: bool, repeats: bool = False) -> list[FrameStep]:
+    def steps_for_frame(self, *, reuse: bool, repeats: bool = False) -> list[FrameStep]:
         """What a frame runs: all steps, or with `reuse` those whose values are gone or out of date.
 
         `repeats` says that it is drawn with the same history as the frame before, and in its place.
@@ -344,27 +344,27 @@ class Executable(Struct, eq=False, dict=True):
         positions = self.reuse.choose(frozenset(self.touched), repeats)
         self.touched.clear()
         if positions is None:
-            return self.lists[parity]
-        key = parity, positions
+            return self.lists[self.parity]
+        key = self.parity, positions
         if key not in self._parts:
             if len(self._parts) >= _MOST_PARTS:
                 self._parts.clear()
-            self._parts[key] = self._listed(parity, positions)
+            self._parts[key] = self._listed(self.parity, positions)
         return self._parts[key]
 
-    def steps_with_stops(self, parity: int, stops: Mapping[int, Call]) -> list[FrameStep]:
+    def steps_with_stops(self, stops: Mapping[int, Call]) -> list[FrameStep]:
         """All steps of a frame, with calls that leave any state before those at some positions, or behind the last one.
 
         Call it behind `steps_for_frame`, which says which kept steps are due.
         """
         keys = [compiled.step.key for compiled in self.steps[0]]
         positions = tuple(at for at, key in enumerate(keys) if key not in self.kept or key in self.due)
-        key = parity, (-1, *positions)
+        key = self.parity, (-1, *positions)
         if key not in self._parts:
             found: list[FrameStep] = []
             edges = [0, *(at for at in sorted(stops) if at), len(keys)]
             for low, high in pairwise(edges):
-                part = self._listed(parity, [at for at in positions if low <= at < high])
+                part = self._listed(self.parity, [at for at in positions if low <= at < high])
                 if low in stops and part:
                     part[0] = FrameStep(part[0].step, (stops[low], *part[0].calls), part[0].timer)
                 found += part

@@ -70,11 +70,9 @@ def camera_words(camera: Camera) -> str:
     _, up, back, eye = (vec3(camera.transform[:3, column]) for column in range(4))
     lens = {"perspective": math.degrees(camera.fov_y), "orthographic": camera.height}.get(camera.type, camera.frustum)
     name = {"perspective": "fov", "orthographic": "height"}.get(camera.type, "frustum")
-    target = camera.target  # kept, because a camera that is moved by hand turns around it
-    away = np.subtract(eye, target) if target is not None else np.zeros(3)
-    distance = float(away @ np.array(back))
-    if target is None or distance <= 0 or np.linalg.norm(away - distance * np.array(back)) > 1e-9 * distance:
-        target = vec3(np.subtract(eye, back))
+    # As far ahead as its own target, which a camera that is moved by hand turns around.
+    distance = 0.0 if camera.target is None else float(np.subtract(eye, camera.target) @ np.array(back))
+    target = vec3(np.array(eye) - (distance if distance > 0 else 1.0) * np.array(back))
     values = {"eye": eye, "target": target, "up": up, name: lens, "near": camera.near, "far": camera.far}
     texts = {
         key: ",".join(map(repr, value)) if isinstance(value, tuple) else repr(value) for key, value in values.items()

@@ -136,8 +136,10 @@ def link(resolved: Resolved) -> Linked:
         scene = scene_of(resolved)
     except InputError as error:  # the file's own mistakes may be why, such as a plugin that is not installed
         raise InputError([*spec.problems, *error.problems]) from None
-    if spec.tree.plain().get("size") is None and (aspect := next(iter(scene.cameras.values())).aspect) is not None:
+    size = spec.tree.get("size")
+    if (size is None or size.data is None) and scene.camera is not None and (aspect := scene.camera.aspect) is not None:
         spec = replace(spec, size=(max(1, round(spec.size[1] * aspect)), spec.size[1]))
+        resolved = replace(resolved, spec=spec)
     graph = rendergraph.link.link(
         spec,
         catalog,
@@ -150,7 +152,7 @@ def link(resolved: Resolved) -> Linked:
     )
     if scene.node_curves:
         graph = replace(graph, warnings=(*graph.warnings, *driven.checked(graph, scene)))
-    return Linked(**{**asdict(resolved), "spec": spec}, scene=scene, graph=graph)
+    return Linked(**asdict(resolved), scene=scene, graph=graph)
 
 
 def sketch(resolved: Resolved) -> Linked:

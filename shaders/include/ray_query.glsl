@@ -1,6 +1,6 @@
-// A search along a ray through the trees over objects and triangles, as in other interfaces for ray queries. It stops
-// at candidates, hits of triangles with a flag of `asks`, for the caller to accept or to leave out; all other hits are
-// accepted at once. `trace_tree.glsl` goes through the trees, `rendergraph/scene/tree_data.py` describes the buffer.
+// Ray queries: a traversal that stops at candidates, hits of triangles with a flag of `asks`, for the caller to accept
+// or to skip. All other hits are accepted at once. `trace_tree.glsl` traverses the trees over objects and triangles,
+// and `rendergraph/scene/tree_data.py` describes their buffer.
 #include <scene.glsl>
 
 uniform isamplerBuffer scene_tree;
@@ -22,21 +22,21 @@ vec3 trace_inverse(vec3 d) {
     return 1.0 / mix(d, least, lessThan(abs(d), vec3(1e-30)));
 }
 
-int trace_stack[TRACE_STACK];  // of the search that goes on; in a structure it would be copied with each call
+int trace_stack[TRACE_STACK];  // of the current query; in a structure it would be copied with each call
 
-// A search. An invocation has one at a time.
+// The state of a query. An invocation can have one at a time.
 struct RayQuery {
     Hit hit;        // the nearest that is accepted, or the first with `any`; its instance is -1 if there is none
-    Hit candidate;  // where the search has stopped
+    Hit candidate;  // where the traversal has stopped
     vec3 origin;
     vec3 direction;
     float nearest;
-    float reach;    // the distance beyond which nothing counts any more
+    float reach;    // hits farther away are ignored
     int wanted;     // flags of what is met: all of them
     int rejected;   // and none of these
     int asks;
-    bool any;       // the search ends at the first hit that is accepted
-    // Where the search is: the node, the stack of those to come, and the ray on the grid of the tree and in the object.
+    bool any;       // the traversal ends at the first hit that is accepted
+    // State of the traversal: the node, the top of the stack, and the ray on the grid of the tree and in the object.
     int node;
     int top;
     bool in_mesh;
@@ -49,7 +49,7 @@ struct RayQuery {
     int flags;
 };
 
-// A search from `origin` along `direction` between the distances `nearest` and `farthest`, both exclusive, for what has
+// A query from `origin` along `direction` between the distances `nearest` and `farthest`, both exclusive, for what has
 // all flags in `wanted` and none in `rejected`. It stops at flags of `asks`; with `any` it ends at the first hit.
 RayQuery ray_query(
     vec3 origin, vec3 direction, float nearest, float farthest, int wanted, int rejected, int asks, bool any) {
@@ -79,7 +79,7 @@ RayQuery ray_query(
     return q;
 }
 
-// Accepts the candidate of the search `q`.
+// Accepts the candidate of the query `q`.
 void accept_candidate(inout RayQuery q) {
     q.hit = q.candidate;
     q.reach = q.candidate.distance;

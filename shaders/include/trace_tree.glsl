@@ -6,7 +6,7 @@ vec3 trace_permuted(vec3 v, int last) {
     return last == 2 ? v : last == 0 ? v.yzx : v.zxy;
 }
 
-// Continues the search `q`: true where it has stopped at a candidate, false where it has ended. The triangle test is
+// Continues the query `q`: true where it has stopped at a candidate, false where it has ended. The triangle test is
 // that of S. Woop, C. Benthin and I. Wald ("Watertight Ray/Triangle Intersection", 2013): no ray passes between two
 // triangles that share an edge.
 //

@@ -13,6 +13,7 @@ import pytest
 from rendergraph import projection
 from rendergraph.projection import look_at
 from rendergraph.scene import pack
+from rendergraph.scene.camera_words import camera_words, described_camera
 from rendergraph.scene.cameras import projection_matrix, view_matrices
 from rendergraph.scene.geometry import translation
 from rendergraph.scene.model import Camera
@@ -138,3 +139,14 @@ def test_depth_is_reversed(matrix: Any, near: float, far: float) -> None:
         slack = projection.INFINITE_EPSILON if far == math.inf else 0.0
         assert depth(made, 0.3, -0.2, -distance, 1) == pytest.approx(expected, rel=3e-6, abs=slack)
     np.testing.assert_array_equal(made[[0, 1, 3]], matrix[[0, 1, 3]].astype(np.float32))
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+def test_camera_words_keep_the_distance_of_the_target(turn: float) -> None:
+    """A camera that is moved by hand turns around its target, also one that an animation has turned away from it."""
+    transform = np.linalg.inv(look_at((1, 2, 8), (1 + 4 * math.sin(turn), 2, 8 - 4 * math.cos(turn)), (0, 1, 0)))
+    camera = Camera("c", transform, fov_y=1.0, target=(1, 2, 4))
+    again = described_camera(camera_words(camera), Camera("other", EYE, fov_y=2.0))
+    assert np.allclose(again.transform, transform, atol=1e-12)
+    assert again.target is not None
+    assert math.dist((1, 2, 8), again.target) == pytest.approx(4 * math.cos(turn))

@@ -716,6 +716,7 @@ class Fingers:
         return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
+@pytest.mark.nightly
 def test_a_phone_turns_pinches_slides_and_taps(browser: Any, served: Any) -> None:
     served.reset(rg.Selection("forward", size=SIZE))
     context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)

@@ -210,21 +210,26 @@ def test_reflections_show_the_projected_environment(session: rg.Session, folder:
     np.testing.assert_allclose(found[checked][:, :3], expected[checked], rtol=0.02)
 
 
-@pytest.mark.parametrize("pipeline", ["forward", "forward-multipass", "shading-gouraud", "deferred"])
-def test_the_ground_mirrors_what_stands_on_it(session: rg.Session, folder: Path, pipeline: str) -> None:
-    """A white wall in place of a black one adds the ground's reflectance for the angle, and only before the wall."""
+def whitened(session: rg.Session, folder: Path, pipeline: str, height: float, size: tuple[int, int]) -> Floats:
+    """What a white wall of this height, 5.9 m ahead, adds to the picture of a black one; its mean over the channels."""
     pictures = []
-    for name, color in (("black", 0), ("white", 1)):
-        scene = folder / f"{name}-wall.yaml"
+    for color in (0, 1):
+        scene = folder / f"wall-{height}-{color}.yaml"
         scene.write_text(
-            "scene: 1\nobjects: {wall: {shape: box, size: [4, 3, 0.2], at: [0, 1.5, -1], material: flat}}\n"
+            f"scene: 1\nobjects: {{wall: {{shape: box, size: [4, {height}, 0.2], at: [0, {height / 2}, -1], material: flat}}}}\n"
             f"materials: {{flat: {{base_color: {color}, unlit: true}}}}\n"
             "cameras: {main: {eye: [0, 1.5, 5], target: [0, 1.5, 0], fov_y_degrees: 60}}\n"
             "environment: {file: linear.exr, ground: true}\n"
         )
-        loaded = rg.load(pipeline, scene=scene, size=(80, 64))
+        loaded = rg.load(pipeline, scene=scene, size=size)
         pictures.append(np.asarray(session.render(loaded, outputs=["radiance"])["radiance"], np.float64)[..., :3])
-    difference = (pictures[1] - pictures[0]).mean(axis=2)
+    return np.asarray((pictures[1] - pictures[0]).mean(axis=2))
+
+
+@pytest.mark.parametrize("pipeline", ["forward", "forward-multipass", "shading-gouraud", "deferred"])
+def test_the_ground_mirrors_what_stands_on_it(session: rg.Session, folder: Path, pipeline: str) -> None:
+    """Before the wall it adds the ground's reflectance for the angle, and beside it nothing."""
+    difference = whitened(session, folder, pipeline, 3, (80, 64))
     y = (1 - 2 * (np.arange(64) + 0.5) / 64) * np.tan(np.radians(30))
     rows = slice(51, 60)  # of the ground, 0.4 to 2.6 m from the wall
     cosine = -y[rows] / np.hypot(1, y[rows])
@@ -236,18 +241,7 @@ def test_the_ground_mirrors_what_stands_on_it(session: rg.Session, folder: Path,
 @pytest.mark.parametrize("pipeline", ["forward", "deferred"])
 def test_a_mirrored_edge_lies_as_far_below_the_ground(session: rg.Session, folder: Path, pipeline: str) -> None:
     """The mirror image of a wall ends where a wall would that goes as deep as this one is high."""
-    pictures = []
-    for name, color in (("black", 0), ("white", 1)):
-        scene = folder / f"low-{name}.yaml"
-        scene.write_text(
-            "scene: 1\nobjects: {wall: {shape: box, size: [4, 0.5, 0.2], at: [0, 0.25, -1], material: flat}}\n"
-            f"materials: {{flat: {{base_color: {color}, unlit: true}}}}\n"
-            "cameras: {main: {eye: [0, 1.5, 5], target: [0, 1.5, 0], fov_y_degrees: 60}}\n"
-            "environment: {file: linear.exr, ground: true}\n"
-        )
-        loaded = rg.load(pipeline, scene=scene, size=(64, 256))
-        pictures.append(np.asarray(session.render(loaded, outputs=["radiance"])["radiance"], np.float64)[..., :3])
-    difference = (pictures[1] - pictures[0])[:, 32].mean(axis=1)
+    difference = whitened(session, folder, pipeline, 0.5, (64, 256))[:, 32]
     tall = np.tan(np.radians(30))
     foot, end = (128 * (1 + y / 5.9 / tall) for y in (1.5, 2.0))  # rows of the ground line and of the mirrored edge
     below = difference[int(foot) + 2 :]

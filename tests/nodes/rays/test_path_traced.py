@@ -587,7 +587,6 @@ def test_shadow_rays_meet_all_panes_and_what_is_behind_them(session: rg.Session,
         "  white: {base_color: 1, specular: 0, roughness: 1, double_sided: true}\n"
         "  pane: {base_color: [0, 0, 0, 0.5], specular: 0, alpha_mode: blend, double_sided: true}\n"
         "lights: {sun: {type: directional, direction: [0, -1, 0], intensity: 3}}\n"
-        "cameras: {main: {eye: [0, 0.5, 0.0], target: [0, 0, 0], up: [0, 0, -1], height: 1, near: 0.01, far: 9}}\n"
     )
     settings = ["light.samples=4", "light.max_bounces=0", "light.ambient=0"]
     found = []
