@@ -1,9 +1,9 @@
-"""Batches: variants of one pipeline that are rendered as one graph, in which passes that compute the same run once.
+"""Batches: variants of one pipeline that are rendered as one graph, in which equal passes run once.
 
-Two nodes compute the same if they have the same type and parameters and read the same ports of nodes that compute the
-same. A texture that another node continues (`InOut`) is the same only if the node that continues it is, too: each
-version has one writer. The classes are found by refining a partition until it is stable, as for states of automata
-(Hopcroft 1971, here in its plain form), so that `@previous` may close cycles.
+Two nodes are equal if they have the same type and parameters and read the same ports of equal nodes. A texture that
+another node modifies in place (`InOut`) is equal only if that node is equal, too: each version has one writer. The
+classes of equal nodes are found by refining a partition until it is stable, as in the minimisation of automata
+(Hopcroft 1971, without its worklist), so `@previous` may close cycles.
 
 The merged graph goes through the ordinary stages: it is scheduled, given memory and executed once, and each output is
 rendered as in the graph it came from.
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 MOST_BYTES = 512 << 20
 """Textures of one batch; the outputs of all its variants exist at the same time."""
 MOST_RUNS = 16
-"""Variants of one batch: what is rendered together is stored together, and lost together when it is interrupted."""
+"""Variants in a batch. An interruption loses the results of a whole batch."""
 MOST_VIEWS = 48
 """View tables of one batch: each has a binding point of its own, and OpenGL guarantees 84."""
 
@@ -60,7 +60,7 @@ def batches(variants: Sequence[Planned], numbers: Sequence[int], most_bytes: int
 
 
 def group_similar(variants: Sequence[Planned], numbers: Sequence[int], most: int) -> list[list[int]]:
-    """Return the variants in groups of at most `most`, those together that share most of their first passes."""
+    """Return the variants in groups of at most `most`; variants in a group share most of their first passes."""
     if not numbers:
         return []
     graphs = [variants[number].linked.graph for number in numbers]
@@ -177,7 +177,7 @@ def _renamed_view(view: str | None, names: Mapping[str, str]) -> str | None:
 
 
 def _equivalence_classes(graphs: Sequence[Graph]) -> dict[Key, int]:
-    """Return the number of each node's class; nodes of one class compute the same."""
+    """Return the number of each node's class; nodes of a class are equal."""
     nodes = {(number, node.id): node for number, graph in enumerate(graphs) for node in graph.nodes}
     followers = _followers(graphs)
     classes: dict[Key, int] = {}

@@ -44,10 +44,10 @@ class Sweep(Results):
 
     Attributes:
         comparison: every run as a variant, in the order of the product.
-        executed, alone: passes that were executed this time, and that those runs would have executed one by one.
-        resumed: runs that were complete already.
-        timed: runs that were rendered already, and were measured.
-        redrawn: runs that were stored, and rendered again because files have changed since.
+        executed, alone: passes executed this time, and passes that the same runs would have executed without sharing.
+        resumed: runs that were already complete.
+        timed: runs that had been rendered before, and were measured this time.
+        redrawn: stored runs that were rendered again because files have changed since.
         torn: incomplete lines of the results.
         failures: runs that could not be rendered or compared; they are not variants.
         search: the result of an optimiser, where one chose the runs.
@@ -110,11 +110,11 @@ def compare(
     """Render pipelines with one scene, one camera and at one size, and compare the pictures.
 
     Args:
-        pipelines: the pipelines, also by their names or files; all use the scene and size of the first one.
-        reference: a picture file or another pipeline, also by its name, as `path-traced:light.seed=1`; the first of
-            `pipelines` by default. One with the outputs `radiance` and `variance` is a truth: it is drawn until its
-            noise is small.
-        options: how to render and measure; in this process, the default, the pipelines take turns.
+        pipelines: pipelines, or their names or files; all use the scene and size of the first one.
+        reference: a picture file, or another pipeline or its name, such as `path-traced:light.seed=1`; the first of
+            `pipelines` by default. A pipeline with the outputs `radiance` and `variance` is ground truth: it is
+            rendered until its noise is small.
+        options: how to render and measure. By default this process renders, and the pipelines take turns.
         names: of the pipelines; those of their files by default.
         size: width and height of the pictures; those of the first pipeline by default.
         settings: attributes of `SweepOptions` by name: `frames=20, metric="ao.occlusion"`.
@@ -163,24 +163,25 @@ def sweep(
 ) -> Sweep:
     """Render every combination of the axes' values into a folder each, and measure it.
 
-    A run's picture and figures are stored as soon as it is rendered, its times when it has been measured, so that an
-    interruption loses little. A run that cannot be rendered gets a line with the reason, and the others continue.
+    A run's picture and figures are stored as soon as it is rendered, and its times once it has been measured, so an
+    interruption loses little. If a run cannot be rendered, its line has the reason, and the others continue.
 
     Args:
-        base: the pipeline that the axes change, also by its name or file.
+        base: the pipeline that the axes change, or its name or file.
         axes: paths with values or ranges: `{"ao.samples": [8, 16], "ao.radius": "log:0.1:1:5"}`; or a `Space`, for
             samples and zipped axes.
         out: the folder; `results.jsonl` in it gets a line for each measured run. Without one, results are kept in
             memory alone.
-        reference: a picture or a pipeline that runs are measured against, also by its name; the first run by default.
+        reference: the picture file, pipeline or name of a pipeline to measure the runs against; the first run by
+            default.
         options: how to render and measure.
         size: width and height of the pictures; those of the pipeline by default.
         settings: attributes of `SweepOptions` by name: `frames=20, resume=True`.
 
     Raises:
-        InputError: an axis names nothing, a value does not fit, the folder has results already, or those of another
-            study, or another sweep is running in it; or what runs are measured against cannot be rendered.
-        RenderError: writing failed, or rendering what runs are measured against.
+        InputError: an axis names no parameter, a value does not fit, the folder already has results or results of
+            another study, another sweep is running in it, or there is a mistake in the reference.
+        RenderError: writing the results or rendering the reference failed.
         DeviceError: there is no usable GL device.
     """
     options = options.replace(**settings)
@@ -240,7 +241,7 @@ def _sweep_of_views(
     options: SweepOptions,
     space: Space,
 ) -> Sweep:
-    """Sweep the runs of each scene, camera and environment on their own: pictures of two scenes are not compared."""
+    """Sweep each scene, camera and environment separately: pictures of two scenes are not compared."""
     parts: list[Sweep] = []
     with report_progress(options.progress, "runs") as report:
         for view, part, only in views:
@@ -276,11 +277,11 @@ def compare_pictures(
 
     Args:
         pictures: the files.
-        reference: what they are measured against; the first of them by default.
+        reference: the file to measure them against; the first of them by default.
         plugins: files or folders that may add metrics, and types of the nodes that made the pictures.
 
     Raises:
-        InputError: a picture cannot be read, has another size than others, or holds light where they hold none.
+        InputError: a picture cannot be read, differs in size, or holds linear light where others hold display values.
     """
     paths = [Path(picture) for picture in pictures]
     names = unique_names([path.stem for path in paths])

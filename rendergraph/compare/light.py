@@ -51,7 +51,7 @@ def light_of(graph: Graph) -> Endpoint:
 
     ports, shown = _ports(graph), graph.outputs.get("image", graph.outputs.get("radiance"))
     if shown is not None and shown in ports:
-        # Output transforms, which turn radiance into colours; what lies behind them works on the picture.
+        # Output transforms, which turn radiance into colours; nodes after them work on the picture.
         ends = {end for end in {shown, *nx.ancestors(ports, shown)} if _is_transform(graph, end)} or {shown}
         ports.add_edges_from((end, _PICTURE) for end in ends)
         dominators: dict[Endpoint, Endpoint] = nx.immediate_dominators(ports, _SCENE)
@@ -77,9 +77,9 @@ def with_light(planned: Planned, light: Endpoint | None) -> Planned:
 
 
 def displayed(gpu: Gpu, planned: Planned, light: Endpoint, pixels: Pixels, output: str, frame: int) -> Pixels:
-    """Return an output of a pipeline as its display chain makes it of other light, with the exposure frozen.
+    """Apply a pipeline's display chain to other light, with the exposure frozen, and return the output.
 
-    What the chain derives from the whole picture, in textures of one texel, is what the pipeline's own light gave.
+    Textures of one texel that the chain derives from the whole picture keep the values of the pipeline's own light.
 
     Args:
         light: the port that the chain begins with.

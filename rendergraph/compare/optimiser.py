@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from rendergraph.session import Pipeline
 
 BATCH_SIZE = 8
-"""Runs that the optimiser asks for before it learns any of their results; they are rendered together."""
+"""Runs that the optimiser suggests at a time; they are rendered together."""
 MOST_REPEATED = 50
-"""Known runs in a row after which no others are expected."""
+"""The search ends after so many known runs in a row."""
 
 Settings: TypeAlias = "tuple[tuple[str, str], ...]"
 """Paths with values, sorted: a key of a run."""

@@ -1,4 +1,4 @@
-"""A comparison before anything is rendered: its runs, planned, and what they are measured against. Needs no GL."""
+"""The preparation of a comparison, without GL: it plans the runs and their reference."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class SweepKeywords(TypedDict, total=False):
 
 
 class TruthLimits(Struct, frozen=True):
-    """When a truth is exact enough: at that part of the smallest error, or after so many samples or seconds."""
+    """When ground truth is accurate enough: its noise is this part of the smallest error, or a limit is reached."""
 
     noise: float
     samples: int | None
@@ -99,7 +99,7 @@ class SweepOptions(Struct, frozen=True, kw_only=True, eq=False):
         repeats: number of measurements, each from the start; the spread of their medians shows how reliable times are.
         kept: which pictures are kept: `all`, or `best`, those on the Pareto front so far and the reference's.
         best: objectives of that front, as for `minimise`.
-        only: numbers of the runs, from 0, to render only a part; names and measurements are those of the whole sweep.
+        only: numbers of the runs to render, from 0; names and errors are those of the whole sweep.
         resume: keep the runs that the folder already has.
         most_bytes: memory limit for textures of variants that are rendered together.
         minimise: objectives of a search: `flip`, `rmse`, `radiance_rmse`, `ms` (time of a frame), `bytes` (of
@@ -109,13 +109,13 @@ class SweepOptions(Struct, frozen=True, kw_only=True, eq=False):
         session: where to render; a private session by default.
         device: GL device number where no session is given.
         executor: `serial`, `processes`, `processes:4`, `dask`, `dask://host:8786`, a Dask `Client`, or an `Executor`;
-            by default what suits the machine. Pictures and metrics do not depend on it, times do.
+            by default chosen for the machine. It affects times, but neither pictures nor metrics.
         devices: GL device numbers to distribute over worker processes.
         timeout: seconds without progress before a worker process is replaced.
-        progress: a function that receives how many runs are done, and of how many; True shows a bar on stderr.
+        progress: a function that receives the number of completed runs and of all runs; True shows a bar on stderr.
         events: a function that receives an event for each step of each worker, as a mapping of plain values.
-        reference_noise: draw a truth until its own noise is this part of the smallest error.
-        reference_samples, reference_seconds: stop before, at so many samples of a pixel or after so many seconds.
+        reference_noise: render ground truth until its own noise is this part of the smallest error.
+        reference_samples, reference_seconds: limits for that, in samples per pixel and in seconds.
     """
 
     metric: str | None = None
@@ -167,11 +167,11 @@ class SweepOptions(Struct, frozen=True, kw_only=True, eq=False):
 class Run:
     """One variant of a comparison, or one combination of a sweep, which has settings and a folder.
 
-    Other processes get it without its plan, and plan it again.
+    It travels to other processes without its plan; they plan it again.
 
     Attributes:
         number: from 0; -1 for a pipeline that is only the reference.
-        reference_key: what decides the picture that it is measured against.
+        reference_key: identifies the picture that it is measured against.
         selection, digest: the pipeline, and what its picture depends on, as they were when the run's task was created.
         is_rendered: its picture exists already; only times are needed.
         light: the port whose light is measured against a truth.
@@ -196,7 +196,7 @@ class Run:
 
     @cached_property
     def key(self) -> str:
-        """What decides its picture and figures, to recognise it when a sweep is resumed."""
+        """Identifies its picture and figures when a sweep is resumed."""
         return run_key(self.planned, self.frame, self.reference_key)
 
     @property
@@ -237,12 +237,12 @@ class Twin:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A comparison of which nothing is rendered yet; everything that can be checked without GL has been checked.
+    """A comparison before rendering; everything that can be checked without GL has been checked.
 
     Attributes:
         output, encoding: what is compared.
-        picture, other, truth: the reference, where it is a file, a pipeline of its own, or one that becomes more exact
-            from frame to frame.
+        picture, other, truth: the reference, if it is a file, a pipeline of its own, or a pipeline that converges to
+            ground truth.
         twins: runs that show how much of an error comes from which technique.
         notes: changes that made the pipelines comparable.
         space, study: the axes of a sweep, and what identifies its folder.
@@ -339,7 +339,7 @@ def by_view(
 
 
 def seen(reference: Path | Pipeline | None, view: Mapping[str, str]) -> Path | Pipeline | None:
-    """Return a reference with the scene, the camera and the environment of the runs that it is measured against."""
+    """Return the reference with the scene, the camera and the environment of the runs that are compared with it."""
     if isinstance(reference, Path):
         text = f"a picture cannot be the reference of several scenes; name a pipeline instead of '{reference}'"
         raise UsageError(Problem("RG500", text))
@@ -402,9 +402,10 @@ def prepare_variants(
 
 
 def _seen_as(variants: Sequence[Pipeline], names: Sequence[str], truth: Pipeline, notes: list[str]) -> Pipeline:
-    """Return a truth with the camera, the environment and the materials of what is compared, unless it has its own.
+    """Return ground truth with the camera, the environment and the materials of the compared pipelines.
 
-    A node of the truth that stands in the place of another type of node takes that one's parameters, such as `shading`.
+    Its own camera and environment take precedence. Where one of its nodes replaces a node of another type, it takes
+    over that node's parameters, such as `shading`.
     """
     own, other = truth.selection, variants[0].selection
     truth = truth.select(camera=own.camera or other.camera, environment=own.environment or other.environment)
@@ -421,9 +422,9 @@ def _seen_as(variants: Sequence[Pipeline], names: Sequence[str], truth: Pipeline
 
 
 def _told(variant: Pipeline, truth: Pipeline) -> dict[str, Any]:
-    """Return what nodes of a pipeline have that the truth's nodes of other types in their places can take over.
+    """Return the parameters that nodes of the truth take over from the nodes of other types that they replace.
 
-    Those are parameters of the same name, unit and default whose values differ, and that the truth itself does not set.
+    They have the same name, unit and default in both, another value, and are not set by the truth itself.
     """
     graph, written, found = truth.link().graph, truth.resolve().spec.nodes, {}
     for node in variant.link().graph.nodes:
@@ -442,7 +443,7 @@ def _told(variant: Pipeline, truth: Pipeline) -> dict[str, Any]:
 
 
 def _twins(run: Run, pipeline: Pipeline, notes: list[str]) -> Iterator[Twin]:
-    """Yield a run for each technique that has a twin, with the twin in its place; a note where it does not fit."""
+    """Yield a run for each technique that has a twin, with the twin in its place; add a note where it does not fit."""
     if run.light is None:
         return  # the truth itself
     linked = run.planned.linked
@@ -464,7 +465,7 @@ def _twins(run: Run, pipeline: Pipeline, notes: list[str]) -> Iterator[Twin]:
 
 
 def _with_twin(pipeline: Pipeline, node: str, twin: NodeType) -> Pipeline:
-    """Return a pipeline with another type for a node, without what `-s` sets for the node and the type lacks."""
+    """Return the pipeline with another type for a node; parameters set by `-s` that the type lacks are removed."""
     known = {*twin.cls.parameters(), *twin.cls.inputs(), *twin.cls.groups(), "enabled"}
 
     def fits(setting: str) -> bool:
@@ -477,7 +478,7 @@ def _with_twin(pipeline: Pipeline, node: str, twin: NodeType) -> Pipeline:
 def _study(base: Pipeline, frame: int, reference: str) -> dict[str, Any]:
     """Return what all runs of a sweep have in common.
 
-    More values of an axis belong to the same study, and so do edited shaders: those runs are rendered again.
+    Adding values to an axis does not change the study. Nor do edited shaders: their runs are rendered again.
     """
     view, spec = base.selection.view_fields, base.resolve().spec
     width, height = spec.size
@@ -505,7 +506,7 @@ def named_reference(reference: Path | Pipeline | str | None) -> Path | Pipeline 
 def read_picture(path: Path, size: tuple[int, int] | None = None, name: str = "") -> tuple[Pixels, Encoding]:
     """Read a reference picture; floats are linear light, integers are display-referred.
 
-    If a size is given, it must have the same; `name` is that of the variant of this size, for the message.
+    If a size is given, the picture must have it; `name` is the variant of this size, for the message.
     """
     from rendergraph.images import read  # a sweep is checked without OpenImageIO
 
@@ -550,7 +551,7 @@ def match_scene_and_size(pipelines: Sequence[Pipeline]) -> tuple[list[Pipeline],
         notes += [f"'{spec.name}' is rendered with the scene of '{first.name}': {first.scene_name}" for spec in strange]
         base = {"extends": str(first.scene)} if first.scene else {"scene": 1}
         changed = {**base, **first.scene_changes.plain()} if first.scene_changes is not None else None
-        # All of them, the first one too: one scene under one name is read once and stays on the GPU.
+        # The first one too, so that all name the scene alike: it is then read once and stays on the GPU.
         pipelines = [
             pipeline.with_scene(changed or first.scene or "") if spec in strange or changed is None else pipeline
             for pipeline, spec in zip(pipelines, specs, strict=True)
@@ -566,7 +567,7 @@ def match_scene_and_size(pipelines: Sequence[Pipeline]) -> tuple[list[Pipeline],
 
 
 def _has_scene_of(spec: PipelineSpec, first: PipelineSpec) -> bool:
-    """Whether two pipelines have the same scene but for what each changes in it."""
+    """Whether two pipelines have the same scene file, whatever each changes in it."""
     if spec.scene is not None or first.scene is not None:
         return spec.scene == first.scene
     return bool(spec.scene_changes and first.scene_changes) and spec.scene_name == first.scene_name

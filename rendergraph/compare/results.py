@@ -1,4 +1,4 @@
-"""Results of comparisons: one for each variant, the reference, and the variants that no other one beats."""
+"""Results of comparisons: one for each variant, the reference, and the Pareto front."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ K = TypeVar("K", bound=Hashable)
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The picture, top row first, that variants are measured against: that of a variant, a pipeline or a file.
+    """The picture that variants are measured against, of a variant, a pipeline or a file; its top row is first.
 
     Attributes:
         output: the name of the compared output.
         light: its scene-linear light, if any.
-        noise: of a truth, the relative mean square error that its own noise adds to that of each variant.
+        noise: of ground truth, the relative mean square error that its noise adds to that of each variant.
         flip_noise: the FLIP between its picture and one with as much noise again.
-        samples: of a truth, the samples of a pixel.
+        samples: of ground truth, the samples per pixel.
     """
 
     name: str
@@ -67,13 +67,13 @@ class Reference:
 
 @dataclass(frozen=True)
 class TwinError:
-    """One technique of a variant, and the relative mean square error of the variant's light without its error.
+    """One technique of a variant, and the error that remains when its twin replaces it.
 
     Attributes:
         node, type: the technique.
-        twin: the type that computes the same exactly.
-        relative_mse: with the twin in its place; None where it cannot take that place or cannot be drawn.
-        reduction: how much smaller that is than the variant's own, as a part of it.
+        twin: the type that computes the same without approximation.
+        relative_mse: of the variant's light with the twin; None if the twin does not fit or cannot be rendered.
+        reduction: 1 − that error / the variant's own.
     """
 
     node: str
@@ -94,7 +94,7 @@ class Difference:
     Attributes:
         node, base_node: the pass in the variant, and in the base, where it may have another name.
         port: the first output that differs.
-        most: greatest difference of a channel, None where sizes or formats differ.
+        most: the greatest difference of a channel; None if sizes or formats differ.
         share: fraction of the texels that differ, 0…1.
         causes: nodes on the way there that differ in structure, possibly the pass itself.
         added: the causes that the base does not have.
@@ -142,12 +142,12 @@ class Result:
         pixels: the compared output; None where the picture was not kept, likewise `flip_map`, (height, width), 0…1.
         radiance_rmse, relative_mse: of linear light against the reference's; None where one of them has none.
         signed_map: how much too bright the light is at each pixel, against a truth: see `metrics.signed_difference`.
-        error_by: what twins of its techniques reduce the error to, the greatest reduction first.
+        error_by: the error that remains with the twin of each technique, the greatest reduction first.
         graph, plan, memory: None and empty for pictures that were read from files.
         difference: of the graph to the base's.
         first: the first pass whose output differs from the base's.
         not_finite: number of pixels with NaN or infinity; if any, the result is excluded from the Pareto front.
-        figures: the outputs of one texel, as in `run --json`.
+        figures: outputs of one texel, as in `run --json`.
     """
 
     name: str
@@ -433,7 +433,7 @@ def objective_values(result: Result | None, objectives: Sequence[str]) -> list[f
 
 
 def pareto_front(values: Mapping[K, Sequence[float]]) -> tuple[K, ...]:
-    """Return the keys whose values no other one beats: as good in everything and better in something.
+    """Return the Pareto front: keys for which no other one is as good in every value and better in one.
 
     They are sorted by the first value.
     """

@@ -1,4 +1,4 @@
-"""Runners: tasks go out to an executor, and what comes back becomes results, in memory or in a sweep's folder."""
+"""Runners: they send tasks to an executor and collect the results, in memory or in a sweep's folder."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ from rendergraph.session.progress import report_progress
 
 
 class Runner:
-    """Compares the runs of a comparison, in memory; a run that fails ends it.
+    """Compares the runs of a comparison in memory; a failed run ends it.
 
-    Results are by the run's number; a result may lack times. The reference may be one of the results.
+    Results are stored by the run's number, and may not have times yet. The reference may be one of the results.
     """
 
     def __init__(self, prepared: Prepared, options: SweepOptions) -> None:
@@ -94,7 +94,7 @@ class Runner:
             progress(*self._progress())
 
     def _draw_truth(self, farm: Executor, truth: Run) -> Reference:
-        """Return the truth as a reference, once it is exact enough for all that is measured against it."""
+        """Render ground truth until it is accurate enough for all runs, and return it as a reference."""
         found: Reference | None = None
         farm.submit(
             TruthTask(
@@ -141,7 +141,7 @@ class Runner:
         )
 
     def _with_errors(self, number: int) -> Result:
-        """Return a result with the errors that twins leave, the smallest first."""
+        """Return a result with the errors that remain with each twin, the smallest first."""
         result, errors = self.results[number], []
         for one in self.twins.get(number, ()):
             left = one.relative_mse if math.isfinite(one.relative_mse) else None
@@ -155,7 +155,7 @@ class Runner:
         return [list(numbers)] if workers == 1 else [[number] for number in numbers]
 
     def _progress(self) -> tuple[int, int]:
-        """Return the number of outputs so far, and of all: two for each run, and one for each twin."""
+        """Return the number of outputs so far, and their total: two for each run and one for each twin."""
         total = 2 * len(self.prepared.runs) + len(self.prepared.twins)
         return min(self._outputs, total), total
 
@@ -184,7 +184,7 @@ class Runner:
             farm.submit(TwinTask(name=own.run.name, needs=(self._handle,), twin=own))
 
     def _take(self, farm: Executor, output: Any, worker: str) -> None:
-        """Store an output of a task; a task that was begun again yields some of them twice."""
+        """Store an output of a task; a task that was restarted yields some of them twice."""
         if isinstance(output, ReferenceResult):
             self.device = output.origin["device"]
             if self.reference is None:
@@ -218,10 +218,10 @@ class Runner:
 
 
 class SweepRunner(Runner):
-    """Renders the runs of a sweep into a folder; a run that fails becomes a line with the reason.
+    """Renders the runs of a sweep into a folder; a failed run becomes a line with the reason.
 
-    Records, as they are stored, and failures are by the run's number. `executed` is the number of executed passes,
-    `alone` of those that the runs need one by one.
+    Records and failures are stored by the run's number. `executed` counts executed passes, `alone` those that the
+    runs would need without sharing.
     """
 
     def __init__(self, prepared: Prepared, options: SweepOptions, folder: SweepFolder) -> None:
@@ -250,7 +250,7 @@ class SweepRunner(Runner):
         return number in self.results and self.results[number].times.covers(self.options.frames, self.options.repeats)
 
     def _groups(self, numbers: Sequence[int], workers: int) -> list[list[int]]:
-        """Return runs that share most in groups, small enough that each worker gets at least two."""
+        """Group runs that share most of their passes; groups are small enough that each worker gets at least two."""
         most = MOST_RUNS if workers == 1 else max(1, min(MOST_RUNS, -(-len(numbers) // (2 * workers))))
         return group_similar([run.planned for run in self.prepared.runs], numbers, most)
 
@@ -293,9 +293,9 @@ class SweepRunner(Runner):
         self._report("run", worker, run=run.name, failed=False)
 
     def _beaten(self) -> set[int]:
-        """Return the runs whose pictures are not kept: another one is as good in everything, and better in something.
+        """Return the runs whose pictures are dropped: they are not on the Pareto front.
 
-        A beaten run stays beaten, so only those with a picture are compared.
+        A run that has left the front never returns to it, so only runs with a picture are compared.
         """
         if self.options.kept == "all":
             return set()
@@ -329,7 +329,7 @@ class SweepRunner(Runner):
             self._task_failed(farm, event)
 
     def _task_failed(self, farm: Executor, event: TaskFailed) -> None:
-        """Try each run of a failed task alone; a run that was alone has failed."""
+        """Retry each run of a failed task alone; a task of one run is not retried."""
         if not isinstance(event.task, VariantTask):
             raise event.error
         missing = set(self.missing)
@@ -371,7 +371,7 @@ def _reason(problems: Sequence[Problem]) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Listing:
-    """A prepared sweep, the numbers of the runs that are complete already, and batches of the others."""
+    """A prepared sweep, the numbers of the runs that are already complete, and batches of the others."""
 
     prepared: Prepared
     kept: frozenset[int]
@@ -382,7 +382,7 @@ class Listing:
         return sum(group.pass_count for group in self.groups)
 
     def shared(self) -> dict[str, tuple[int, int]]:
-        """Return for each pass, in order of execution, how often it would run, and how often without sharing."""
+        """Return how often each pass would run, with and without sharing, in order of execution."""
         shared: dict[str, set[tuple[int, str]]] = {}
         alone: dict[str, int] = {}
         for at, group in enumerate(self.groups):

@@ -1,6 +1,6 @@
 """The folder of a sweep: `study.json`, a folder with picture and `run.json` for each run, and `results.jsonl`.
 
-A run's picture and `run.json` are written as soon as it is rendered; its line in the results when it is measured.
+A run's picture and `run.json` are written as soon as it is rendered, its line in the results once it is measured.
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class ResultsLog:
-    """A file of JSON lines that only grows; each has the SHA-256 of the rest of it, so that a torn end does no harm."""
+    """An append-only file of JSON lines; each line has the SHA-256 of its other fields, to detect incomplete ones."""
 
     path: Path
 
@@ -228,14 +228,14 @@ class SweepFolder:
 
     @classmethod
     def open(cls, path: Path, study: Mapping[str, Any], *, resume: bool) -> SweepFolder:
-        """Open a locked folder, and remove what a killed sweep was about to write."""
+        """Open a locked folder, and remove files that a killed sweep left half-written."""
         check_folder(path, study, resume=resume)
         for part in (*path.glob(".*.part"), *path.glob("*/.*.part")):
             part.unlink(missing_ok=True)
         return cls(path, *ResultsLog(path / RESULTS).by_key())
 
     def begin(self, study: Mapping[str, Any]) -> None:
-        """Write what is studied here; to be called before the first picture is written."""
+        """Write `study.json`; to be called before the first picture is written."""
         _write_json(self.path / STUDY, study)
 
     def keep(self, run: Run, result: Result, picture: bytes, origin: Mapping[str, Any]) -> RunRecord:

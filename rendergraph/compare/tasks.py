@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 Origin: TypeAlias = Mapping[str, Mapping[str, Any]]
 """The GL device and the machine of a worker: `device`, `machine`."""
 FRAMES_PER_TURN = 2
-"""Few, so that other work of the machine affects all variants alike."""
+"""Few, so that other load on the machine affects all variants alike."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,9 +92,9 @@ TaskEvent: TypeAlias = "ReferenceResult | RenderedResult | TimingResult | TaskEr
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class VariantTask(Task):
-    """Runs that are rendered together; passes that they share are executed once.
+    """Runs of one scene, camera and size that are rendered together; shared passes are executed once.
 
-    They have the same scene, camera and size. Unless they need a reference, they are measured against the first one.
+    Without a reference in `needs`, they are measured against the first one.
     """
 
     name: str
@@ -111,7 +111,7 @@ class VariantTask(Task):
         return reference
 
     def run(self, worker: Worker) -> Iterator[TaskEvent]:
-        """Yield each run's picture, then its times, batch after batch; a faulty run ends only itself."""
+        """Yield each run's picture, then its times, batch after batch; a run that fails does not end the others."""
         runs: list[tuple[Run, Planned]] = []
         for run in self.runs:
             try:
@@ -165,7 +165,7 @@ class VariantTask(Task):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ComparisonTask(VariantTask):
-    """Runs of any structure, each rendered by itself; they take turns in measuring, and are compared with a base."""
+    """Runs of any structure, each rendered separately; they are measured in turns and compared with a base."""
 
     base: Run
 
@@ -304,9 +304,9 @@ def taps(graph: Graph, plan: ResourcePlan) -> list[str]:
 def first_difference(
     base: Frame, variant: Frame, plan: ResourcePlan, graph: Graph, difference: GraphDiff
 ) -> Difference | None:
-    """Return the first pass of the variant that has a counterpart in the base and another output, bit by bit.
+    """Return the first pass of the variant whose output differs from its counterpart in the base in any bit.
 
-    A pass that only one of the two has is not a difference by itself: the passes that read it show whether it matters.
+    A pass without a counterpart is not a difference by itself: the passes that read it show whether it matters.
     The frames are from `every_output`; plan and graph are the variant's.
     """
     import networkx as nx  # needed for a difference alone, and slow to import

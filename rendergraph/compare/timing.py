@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rendergraph.execute import FrameTimes
 
 Cost: TypeAlias = "tuple[float, float | None]"
-"""Milliseconds on the CPU and on the GPU; the latter is None without a timer."""
+"""Milliseconds on the CPU and on the GPU; None if the driver has no timer."""
 
 
 class Spread(Struct, frozen=True, forbid_unknown_fields=True):
@@ -47,7 +47,7 @@ class Times(Struct, frozen=True):
 
     Attributes:
         frames: number of measured frames.
-        frame_ms: from the first call until the device has finished; None where frames were shared with other pipelines.
+        frame_ms: from the first call until the device has finished; None if other pipelines shared the frames.
         gpu_ms, cpu_ms: time of all passes together, on the GPU, and in Python and the driver.
         repeats: the median of the headline time, in milliseconds, of each measurement; empty for a single one.
     """
@@ -61,7 +61,7 @@ class Times(Struct, frozen=True):
 
     @property
     def headline(self) -> Spread:
-        """The figure that tables sort by: GPU time, or the time of the whole frame where that is unknown."""
+        """The figure that tables sort by: GPU time, or the time of the whole frame if that is unknown."""
         return self.gpu_ms or self.frame_ms or self.cpu_ms
 
     @property

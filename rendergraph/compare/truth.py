@@ -1,9 +1,9 @@
-"""The truth as a reference: a pipeline whose mean grows more exact from frame to frame, and says how exact it is.
+"""Ground truth as a reference: a pipeline that converges from frame to frame and estimates its own noise.
 
-Such a pipeline has the outputs `radiance`, the mean so far, and `variance`, that of this mean; `samples_taken` counts
-the samples of each pixel. The truth is drawn until its own noise is a small part of the smallest error that it is to
-measure. Noise and errors are relative mean square errors of the light, so they can be compared and subtracted: the
-error that is measured is the sum of both.
+Such a pipeline has the outputs `radiance`, the mean so far, and `variance`, the variance of that mean; `samples_taken`
+counts the samples of each pixel. It is rendered until its noise is a small part of the smallest error to be measured.
+Noise and errors are relative mean square errors of the light, so they can be compared and subtracted: a measured error
+is the sum of both.
 """
 
 from __future__ import annotations
@@ -39,30 +39,30 @@ if TYPE_CHECKING:
     Pixels = npt.NDArray[Any]
 
 TWIN_FRAMES = 16
-"""Frames whose mean is a twin's light: a traced twin is noisy in a single one."""
+"""Frames to average for a twin's light: a single frame of a traced twin is noisy."""
 _LEAST_FRAMES = 2
-"""In one frame, pixels whose few samples are all alike seem to have no variance."""
+"""After one frame, pixels whose few samples are all equal seem to have no variance."""
 _MOST_CACHED = 1 << 30
-"""Bytes of all truths on the disk; those used longest ago are removed."""
+"""Bytes of cached truths on the disk; the least recently used are removed."""
 _MOST_LIGHTS = 512 << 20
-"""Bytes of the light of runs that are drawn beforehand, to know the smallest error."""
+"""Bytes of the light of the runs, which is rendered first to know the smallest error."""
 
 
 class TruthProgress(NamedTuple):
-    """The completed part of a truth, 0…1, the samples of a pixel, and how much larger its noise is than wanted."""
+    """The completed part of a truth, 0…1, its samples per pixel, and the ratio of its noise to the target."""
 
     part: float
     samples: int
     excess: float | None = None
 
     def __str__(self) -> str:
-        noise = f", noise {self.excess:.2g} × that wanted" if self.excess is not None else ""
+        noise = f", noise {self.excess:.2g} × the target" if self.excess is not None else ""
         return f"{self.samples} samples{noise}"
 
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The light, (height, width, 3), the variance of each of its values, the samples of a pixel, and the time taken."""
+    """The light, (height, width, 3), the variance of each value, the samples per pixel, and the time taken."""
 
     radiance: npt.NDArray[np.float32]
     variance: npt.NDArray[np.float32]
@@ -82,12 +82,12 @@ class Truth:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TruthTask(Task):
-    """Draw the truth: yields its progress now and then, and at last the reference.
+    """Render the truth: yield its progress, and finally the reference.
 
     Attributes:
-        key: what decides the truth, besides the number of samples.
+        key: identifies the truth, except for the number of samples.
         truth, base: the pipeline of the truth, and the one whose display chain makes the picture.
-        runs: what is measured against it.
+        runs: the runs that are measured against it.
     """
 
     name: str
@@ -131,7 +131,7 @@ class TruthTask(Task):
 
 @dataclass(frozen=True, eq=False)
 class TwinResult:
-    """The error of a run's light with the twin in place of one of its techniques; NaN where it cannot be drawn."""
+    """The error of a run's light with the twin in place of one of its techniques; NaN if it cannot be rendered."""
 
     twin: Twin
     relative_mse: float
@@ -150,7 +150,7 @@ class TwinTask(Task):
 
 
 def representatives(runs: Sequence[Run]) -> tuple[Run, ...]:
-    """Return the runs whose light is drawn before the truth: all, or as many as fit, evenly spaced."""
+    """Return the runs whose light is rendered before the truth: all, or as many as fit in memory, evenly spaced."""
     width, height = runs[0].planned.linked.graph.size
     most = max(1, _MOST_LIGHTS // (12 * width * height))
     return tuple(runs[:: math.ceil(len(runs) / most)])
@@ -159,14 +159,14 @@ def representatives(runs: Sequence[Run]) -> tuple[Run, ...]:
 def draw_truth(
     gpu: Gpu, planned: Planned, frame: int, lights: Sequence[Pixels], limits: TruthLimits
 ) -> Iterator[TruthProgress | Truth]:
-    """Draw a truth of the scene at a frame's time; yield its progress after each frame, and at last the truth.
+    """Render the truth at a frame's time; yield its progress after each frame, and finally the truth.
 
     Args:
-        gpu: where to draw; nothing else may be drawn there meanwhile.
+        gpu: where to render; nothing else may be rendered there meanwhile.
         planned: the pipeline of the truth.
-        frame: the frame whose scene is drawn again and again; frame numbers continue, so samples differ.
-        lights: what will be measured against it, (height, width, channels) each.
-        limits: when it is exact enough.
+        frame: the frame whose scene is rendered repeatedly; frame numbers advance, so samples differ.
+        lights: the light that will be measured against it, (height, width, channels) each.
+        limits: when it is accurate enough.
     """
     names = tuple(name for name in ("radiance", "variance", "samples_taken") if name in planned.linked.graph.outputs)
     options = RenderOptions(frames=range(frame, frame + 1), still=frame, outputs=names)
@@ -218,7 +218,7 @@ def _is_enough(truth: Truth, lights: Sequence[Pixels], limits: TruthLimits) -> b
 
 
 def _light(gpu: Gpu, planned: Planned, run: Run, frames: int = 1) -> Pixels:
-    """Return the light of a run's frame; the mean of several frames, in which the scene is as in the first one."""
+    """Return the light of a run's frame, or the mean of several frames in which the scene stands still."""
     linked = with_light(planned, run.light).linked
     last = run.frame + frames - 1
     options = RenderOptions(frames=range(run.frame, last + 1), still=run.frame, outputs=(LIGHT,))
@@ -239,7 +239,7 @@ def cache_folder() -> Path:
 
 
 def _load(key: str) -> Truth | None:
-    """Return the cached truth; None where there is none, or none that can be read."""
+    """Return the cached truth; None if there is none or it cannot be read."""
     path = cache_folder() / f"{key}.npz"
     try:
         with np.load(path, allow_pickle=False) as stored:
@@ -251,7 +251,7 @@ def _load(key: str) -> Truth | None:
 
 
 def _save(key: str, truth: Truth) -> None:
-    """Cache a truth; a disk that is full or cannot be written to costs only the time to draw it again."""
+    """Cache a truth. If the disk is full or read-only, it will only have to be rendered again."""
     data = io.BytesIO()
     np.savez(
         data,
@@ -273,12 +273,12 @@ def _save(key: str, truth: Truth) -> None:
 
 
 def noise_note(reference: Reference, smallest: float | None, limits: TruthLimits) -> str | None:
-    """Return a sentence about a truth that is noisier than wanted, None if it is exact enough."""
+    """Return a sentence about a truth that is noisier than wanted; None if it is accurate enough."""
     noise = reference.noise
     if noise is None or smallest is None or noise <= limits.noise * smallest:
         return None
     if not math.isfinite(noise):
-        return f"'{reference.name}' holds NaN or infinity, so its noise is unknown"
+        return f"'{reference.name}' contains NaN or infinity, so its noise is unknown"
     part = (
         f"{100 * noise / smallest:.0f} % of the smallest error" if smallest > 0 else "not below the smallest error, 0"
     )

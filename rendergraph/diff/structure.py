@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Retyped(Struct, frozen=True):
-    """A node of another type. If two shaders have the same name beside two pipelines, `files` names both."""
+    """A node of another type. `files` names both shaders if they have the same name in different folders."""
 
     node: str
     old: str
@@ -49,7 +49,7 @@ class LinkChange(Struct, frozen=True):
 
 
 class OutputChange(Struct, frozen=True):
-    """An output of the pipeline that shows another port; None where there is no output of that name."""
+    """An output of the pipeline that shows another port; None if there is no output of that name."""
 
     name: str
     old: str | None
@@ -61,13 +61,13 @@ class GraphDiff(Struct, frozen=True):
 
     Attributes:
         names: of the two pipelines.
-        nodes: first graph's node to the second's, for all that were recognised.
+        nodes: the first graph's nodes to the second's, where they match.
         added, removed: nodes that only the second, only the first graph has.
         disabled: nodes among these that the other graph disables with `enabled: false`.
         renamed: old id to new id, if only the id differs.
         retyped: nodes of another type under the same id.
-        parameters: values that differ; of retyped nodes, those that one of the types lacks only if they are set.
-        links: inputs that read something else, without those of added and removed nodes.
+        parameters: values that differ; a parameter that only one of two types has counts only if it is set.
+        links: inputs that read another port, except those of added and removed nodes.
         outputs: those that show another port.
         sizes: both sizes if they differ.
     """
@@ -93,7 +93,7 @@ class GraphDiff(Struct, frozen=True):
         return any(changes) or self.sizes is not None
 
     def changed(self, *, links: bool = True) -> dict[str, list[str]]:
-        """Return the nodes of both graphs that differ, by their ids in the second, each with its changes in short."""
+        """Return the nodes that differ, by their ids in the second graph, each with a summary of its changes."""
         notes: dict[str, list[str]] = {}
         for retyped in self.retyped:
             text = "another text" if retyped.files else f"{retyped.old} → {retyped.new}"
@@ -107,9 +107,9 @@ class GraphDiff(Struct, frozen=True):
 
 
 def diff(a: Any, b: Any) -> GraphDiff:
-    """Return what turns `a` into `b`: graphs, or pipelines, also by their names, files or content.
+    """Return what turns `a` into `b`: graphs, or pipelines, or their names, files or content.
 
-    Both are resolved and linked, so only their meaning is compared. Printed, it is what `rendergraph diff` prints.
+    Both are resolved and linked, so only their meaning is compared. Its text is what `rendergraph diff` prints.
     """
     a, b = _graph(a), _graph(b)
     nodes = _matched(a, b)

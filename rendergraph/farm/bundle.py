@@ -1,7 +1,7 @@
-"""The input files of pipelines, so that workers which share no disk can have them, too.
+"""The input files of pipelines, for workers that share no disk with the client.
 
-A file is identified by its content, and each worker gets it once. On a worker the files lie beneath a folder as they
-lie beneath `/` on the client, the current folder included, so that relative paths and the rules about roots still hold.
+A file is identified by its content, and each worker gets it once. A worker keeps the files below a folder, where they
+have the same paths as below `/` on the client, so that relative paths and the rules about roots still hold.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _SKIPPED_FOLDERS = frozenset({"__pycache__", ".git", ".hg", ".venv", "node_modul
 
 @dataclass(frozen=True)
 class Bundle:
-    """The files that workers need, by path with the SHA-256 of the content, and where and with what the client runs."""
+    """The files that workers need, by path with the SHA-256 of the content, and the client's folder and packages."""
 
     files: Mapping[str, str]
     folders: tuple[str, ...]
@@ -63,8 +63,8 @@ class Bundle:
 def make_bundle(read: Iterable[str], plugins: Sequence[Path], modules: Iterable[str] = ()) -> Bundle:
     """Collect the files that the work needs.
 
-    `read` are the files and folders that planning has looked for, whether they exist or not; `modules` those of the
-    node classes in use: installed packages among them must be installed on the workers, too.
+    `read` has the files and folders that planning looked for, whether they exist or not, and `modules` those of the
+    node classes in use. Installed packages must also be installed on the workers.
     """
     shipped = [folder(name).resolve() for name in SHIPPED]
     paths = [path for path in map(Path, read) if not any(path.resolve().is_relative_to(root) for root in shipped)]
@@ -108,7 +108,7 @@ def _distributions(modules: Iterable[str]) -> set[str]:
 
 
 def digest_of(name: str) -> str:
-    """Return the SHA-256 of a distribution's source files, which tells two of one version apart."""
+    """Return the SHA-256 of a distribution's source files; two builds of one version may differ."""
     digest = hashlib.sha256()
     for path in sorted(_sources(name)):
         digest.update(path.name.encode())
@@ -127,7 +127,7 @@ def _sources(name: str) -> Iterable[Path]:
 
 
 def check_packages(needed: Mapping[str, tuple[str, str]], worker: str) -> InputError | None:
-    """Return why this process, on a worker, would render something else than the client, None where it would not."""
+    """Return why this worker process would render differently from the client; None if it would not."""
     problems = []
     for name, (client, digest) in needed.items():
         own, what = version(name), "rendergraph" if name == OWN else f"the plugin '{name}'"
@@ -163,7 +163,7 @@ def _relocate(path: Path, root: Path) -> Path:
 
 
 def _relocated(value: Any, root: Path) -> Any:
-    """Return a value of Python with each absolute path in it, such as that of an array, beneath a worker's folder."""
+    """Return a Python value with each absolute path in it, such as that of an array, moved below a worker's folder."""
     if isinstance(value, Mapping):
         return {key: _relocated(child, root) for key, child in value.items()}
     if isinstance(value, list):
@@ -174,7 +174,7 @@ def _relocated(value: Any, root: Path) -> Any:
 
 
 def map_remote_paths(error: RendergraphError, root: Path | None) -> RendergraphError:
-    """Return the error with the client's names of files instead of those beneath a worker's folder."""
+    """Return the error with the client's file names instead of those below a worker's folder."""
     if root is None:
         return error
 

@@ -1,4 +1,4 @@
-"""A Dask cluster as an executor: one that is started here, one at an address, or that of a `Client`."""
+"""A Dask cluster as an executor: started here, at an address, or that of a `Client`."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ Cluster: TypeAlias = Any
 Future: TypeAlias = Any
 
 CONNECT_SECONDS = 10.0
-"""For a scheduler to answer, and to answer again."""
+"""Seconds for a scheduler to answer, and to answer again."""
 COPIES = 2
-"""Workers that hold uploaded content before any task needs it, so that the loss of one loses nothing."""
+"""Number of workers that first hold uploaded content, so that losing one of them loses nothing."""
 _POLL = 0.25
 _RESUME = "finished runs are saved; continue with --resume"
 _WORKER_LEAVES = (OSError, KeyError, ValueError)
@@ -145,7 +145,7 @@ class Dask(Executor):
         return InputError(Problem("RG642", f"a worker cannot use rendergraph ({' '.join(error.split())[:200]}); {fix}"))
 
     def _upload(self, contents: dict[str, bytes]) -> None:
-        """Send contents to workers, by their SHA-256; other workers get them from those when they need them."""
+        """Send contents to some workers, by their SHA-256; other workers fetch them from these when they need them."""
         begun = time.monotonic()
         named = {f"{self._setup}-{self._uploads}-{digest}": content for digest, content in contents.items()}
         while named:
@@ -161,7 +161,7 @@ class Dask(Executor):
                 return
 
     def _upload_again(self) -> None:
-        """Send everything once more, because the workers that had some of it are gone."""
+        """Send everything again, because workers that held some of it are gone."""
         contents = dict(self._values)
         for digest, path in self._paths.items():
             contents[digest] = path.read_bytes() if path.is_file() else b""
@@ -216,7 +216,7 @@ class Dask(Executor):
                 yield from self._events_of(task, future)
 
     def _check_scheduler(self, gone: float | None) -> float | None:
-        """Return since when the scheduler has not answered, None if it does; a RenderError ends a long wait."""
+        """Return when the scheduler stopped answering; None if it answers. A RenderError ends a long wait."""
         if self._client.status == "running":
             return None
         gone = gone or time.monotonic()
@@ -258,7 +258,7 @@ class Dask(Executor):
                 yield TaskFailed(task, worker, value)
 
     def close(self) -> None:
-        """Leave the cluster: our tasks there end, and so does a cluster that was started here."""
+        """Leave the cluster and end our tasks there; a cluster that was started here ends, too."""
         self._tasks.clear()
         with contextlib.suppress(Exception):  # it may be gone, in any way
             if self._client.status == "running":

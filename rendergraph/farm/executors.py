@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 ExecutorChoice: TypeAlias = "str | Executor | Any | None"
 """A name, an executor, a Dask `Client`; None leaves the choice to the size of the work."""
 ENOUGH_CORES = 4
-"""A software rasteriser uses all cores: on fewer than these, more processes gain nothing."""
+"""A software rasteriser uses all cores: with fewer than these, more processes gain nothing."""
 _NAMES = "serial, processes, processes:N, dask, dask:N, dask://HOST:PORT"
 _NAME = re.compile(r"serial|(processes|dask)(?::([1-9][0-9]{0,3}))?|dask://[^\s/]+:[0-9]{1,5}")
 _MOST_WORKERS = 1024
@@ -36,7 +36,7 @@ def make_executor(
     timeout: float | None = None,
     travels: bool = True,
 ) -> AbstractContextManager[Executor]:
-    """Return the chosen executor, to be closed by a `with` statement, which leaves open one that was given.
+    """Return the chosen executor, for a `with` statement, which closes it unless it was given.
 
     The default is this process, or for several tasks as many processes as the machine has devices, or cores if it has
     only a software rasteriser. Work with in-memory node classes does not travel to other processes.

@@ -1,4 +1,4 @@
-"""Tasks in several processes of this machine; if one is lost, its task begins again, and nothing else is affected."""
+"""Tasks in several processes on this machine; if a process is lost, only its task begins again."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Processes(Executor):
         return self._busy.pop(worker)
 
     def _retry(self, worker: WorkerProcess, error: RendergraphError) -> Event:
-        """End a process that is of no more use; its task is begun again, or has failed."""
+        """End a process that cannot be used any more; its task begins again, or has failed."""
         worker.kill()
         return self.retry(self._free(worker), worker.name, error)
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 ATTEMPTS = 2
 """Attempts per task, if the worker may be the cause of a failure."""
 _DEVICE_CODES = frozenset({"RG612", "RG613", "RG614", "RG616"})
-"""Errors that may differ on another device, or when less is done at once: memory, read-back, driver."""
+"""Errors that may not occur on another device or in smaller tasks: memory, read-back, driver."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class TaskFinished:
 
 @dataclass(frozen=True, eq=False)
 class TaskRetried:
-    """A worker was lost with a task, or gave up for reasons of its own; another one begins the task again."""
+    """A worker was lost during a task, or failed for reasons of its own; another one begins the task again."""
 
     task: Task
     worker: str
@@ -100,7 +100,7 @@ class TaskRetried:
 
 @dataclass(frozen=True, eq=False)
 class TaskFailed:
-    """A task will not be done: it has failed itself, or is `lost` with as many workers as it may lose."""
+    """A task will not be completed: it has failed itself, or is `lost` because too many workers were lost with it."""
 
     task: Task
     worker: str
@@ -116,7 +116,7 @@ Event: TypeAlias = "TaskOutput | TaskFinished | TaskRetried | TaskFailed"
 
 
 class Executor(AbstractContextManager["Executor"], ABC):
-    """Takes tasks and reports what becomes of them. One thread uses it; leaving its block ends all running tasks."""
+    """Runs tasks and reports their events. Only one thread may use it; leaving its block ends all running tasks."""
 
     workers: int
 
@@ -130,7 +130,7 @@ class Executor(AbstractContextManager["Executor"], ABC):
 
     @abstractmethod
     def events(self) -> Iterator[Event]:
-        """Yield what happens, until every submitted task has finished or failed.
+        """Yield events until every submitted task has finished or failed.
 
         A DeviceError says that no worker has a usable GL device, a RenderError that the cluster is gone.
         """
@@ -147,7 +147,7 @@ class Executor(AbstractContextManager["Executor"], ABC):
         """Send the input files to workers that do not share a disk with this process, and check their packages."""
 
     def retry(self, task: Task, worker: str, error: RendergraphError, *, inputs_lost: bool = False) -> Event:
-        """Submit a task again whose worker was lost, unless that was too often; with a worker, inputs may be lost."""
+        """Submit a task again whose worker was lost, unless that happened too often; its inputs may be lost, too."""
         self._losses[task, inputs_lost] += 1
         if self._losses[task, inputs_lost] < (self.workers + 1 if inputs_lost else ATTEMPTS):
             self.submit(task)

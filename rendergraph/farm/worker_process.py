@@ -1,4 +1,4 @@
-"""Python processes at the other end of a pipe: any that answers messages, and the worker process that runs tasks."""
+"""Python processes at the other end of a pipe: the general class, and the worker process that runs tasks."""
 
 from __future__ import annotations
 

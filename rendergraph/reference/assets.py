@@ -18,7 +18,7 @@ _YAML = (".yaml", ".yml")
 
 
 def kind_of(topic: str) -> Literal["pipeline", "scene"] | None:
-    """Return what a shipped name or a path stands for; None for neither."""
+    """Return what a shipped name or a path refers to; None if it is neither."""
     if topic in shipped_pipelines():
         return "pipeline"
     path = Path(topic)

@@ -1,8 +1,8 @@
 """A complete pipeline that uses a node type, for `explain` and the reference.
 
-A type that shipped pipelines use is shown by the shortest of those files in which one takes part. For any other type, a
-patch on a shipped pipeline is made: every required input gets a port that fits, and the first output goes to a node
-that accepts it. The result is linked to make sure that it is legal.
+If shipped pipelines use the type, the shortest of them is the example. Otherwise the node is inserted into a shipped
+pipeline: every required input gets a port that fits, and the first output goes to a node that accepts it. The result
+is linked to make sure that it is valid.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def _takes_part(node_type: NodeType, text: str, catalog: Catalog) -> bool:
 
 
 def _patches(node_type: NodeType, base: Graph) -> Iterator[str]:
-    """Files to try, best first: with the inputs that outputs need and a reader; with fewer inputs; without a reader."""
+    """Files to try, best first: with the inputs that outputs need and a reader, with fewer inputs, without a reader."""
     needed = {name for port in node_type.cls.outputs().values() for name in getattr(port, "needs", ())}
     tried = []
     for optional in (needed, set[str]()):
