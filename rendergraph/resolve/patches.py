@@ -109,7 +109,10 @@ def _drop(name: str, node: Value, change: Value, new_type: Value, names: TypeNam
         own = written.mapping if written is not None else {}
         lost = [key for key in inherited if key not in known and key not in own]
         if part in parts and lost:
-            parts[part] = parts[part].with_data({key: value for key, value in inherited.items() if key not in lost})
+            left = {key: value for key, value in inherited.items() if key not in lost}
+            parts[part] = parts[part].with_data(left)
+            if not left:
+                del parts[part]
             word_for = part.removesuffix("s") if len(lost) == 1 else part
             listed = ", ".join(f"'{key}'" for key in lost)
             text = f"node '{name}' is now '{new}', which has no {word_for} {listed} of '{old}'; dropped"

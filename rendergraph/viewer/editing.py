@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import yaml
 from msgspec.structs import replace
 
 from rendergraph.catalog import Catalog
@@ -20,7 +21,7 @@ from rendergraph.declare import Function, Views
 from rendergraph.document import Source, YamlLimits, from_plain, read_text
 from rendergraph.edit import PipelineText
 from rendergraph.edit import text as yaml_text
-from rendergraph.errors import InputError, Problem, RendergraphError, UsageError
+from rendergraph.errors import InputError, Place, Problem, RendergraphError, UsageError, shown_file
 from rendergraph.resolve import diff, to_yaml
 from rendergraph.resolve.patches import settings
 from rendergraph.resources import shipped_pipelines, shipped_scenes
@@ -66,6 +67,8 @@ def edited(pipeline: PipelineText, sets: Iterable[str], operations: Sequence[Seq
         if setting.scope or setting.node in (None, "scene"):
             path, _, value = text.partition("=")
             beside[path] = value
+        elif setting.name == "type":  # parameters and inputs that the new type lacks go, as with `-s`
+            pipeline.retype(setting.node, str(setting.value.plain()))
         else:
             pipeline.set(f"{setting.node}.{setting.name}", setting.value.plain())
     for name, *words in operations:
@@ -86,21 +89,31 @@ def problems_of(selection: Selection) -> list[dict[str, Any]]:
     try:
         stages.check(stages.link(stages.resolve(selection)))
     except RendergraphError as error:
-        return [problem.as_json() | {"node": _node_at(problem, selection)} for problem in error.problems]
+        return [problem.as_json() | {"node": node_at(problem, selection)} for problem in error.problems]
     return []
 
 
-def _node_at(problem: Problem, selection: Selection) -> str | None:
+def node_at(problem: Problem, selection: Selection) -> str | None:
+    """Return the node that a setting names, or the one at a problem's line in the opened file; otherwise None."""
     place = problem.place
     if place is None:
         return None
     if (setting := place.option("--set")) is not None:
         return setting.path.partition(".")[0]
-    if selection.text is None or place.file != selection.source:
+    if not is_in_opened(place, selection):
         return None
-    nodes = (yaml_text.spans(selection.text, ("nodes",))[-1].children or {}).items()
-    above = [name for name, span in nodes if selection.text.count("\n", 0, span.first) < place.line]
+    try:
+        text = selection.text or read_text(Path(place.file), YamlLimits(), place.file)
+        nodes = (yaml_text.spans(text, ("nodes",))[-1].children or {}).items()
+    except (InputError, yaml.YAMLError):  # no nodes can be found in it
+        return None
+    above = [name for name, span in nodes if text.count("\n", 0, span.first) < place.line]
     return above[-1] if above else None
+
+
+def is_in_opened(place: Place, selection: Selection) -> bool:
+    own = own_file(selection)
+    return place.file == selection.source or (own is not None and place.file == shown_file(own))
 
 
 # --- what is written --------------------------------------------------------------------------------------------------

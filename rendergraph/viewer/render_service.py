@@ -15,7 +15,7 @@ from msgspec.structs import replace
 
 from rendergraph import images, stamps
 from rendergraph.compile import Executable
-from rendergraph.errors import Place, Problem, RendergraphError, shown_file
+from rendergraph.errors import Problem, RendergraphError, shown_file
 from rendergraph.metrics import measure
 from rendergraph.resolve.patches import settings
 from rendergraph.scene.cameras import bounding_sphere
@@ -28,7 +28,7 @@ from rendergraph.session.selection import RenderOptions, Selection
 from rendergraph.session.values import Expanded, Linked, Planned
 from rendergraph.stamps import Stamps
 from rendergraph.textures import TextureDesc
-from rendergraph.viewer import messages
+from rendergraph.viewer import editing, messages
 from rendergraph.viewer.describe import describe
 from rendergraph.viewer.messages import Look, RenderRequest, Request, Response
 
@@ -105,7 +105,10 @@ class RenderService:
         try:
             return self._answer(request)
         except RendergraphError as error:
-            return Response(problems=tuple(self._as_json(problem) for problem in error.problems))
+            selection = request.selection if isinstance(request, RenderRequest) else Selection("")
+            return Response(
+                problems=tuple(one.as_json() | {"node": self._node_at(one, selection)} for one in error.problems)
+            )
 
     @singledispatchmethod
     def _answer(self, request: Request) -> Response:
@@ -331,22 +334,16 @@ class RenderService:
     def _encode(self, picture: npt.NDArray[np.uint8], ending: str) -> bytes:
         return images.picture_bytes((Path(f"picture{ending}"), picture, None, "data", False), {})
 
-    def _as_json(self, problem: Problem) -> dict[str, Any]:
-        return problem.as_json() | {"node": self._node_at(problem.place) if problem.place else None}
-
-    def _node_at(self, place: Place) -> str | None:
-        """Return the node that is declared or set at a place, or whose type comes from that file."""
-        if (setting := place.option("--set")) is not None:
-            return setting.path.partition(".")[0]
-        if self._planned is None:
-            return None
-        if (id := self._node_of_file.get(place.file)) is not None:
+    def _node_at(self, problem: Problem, selection: Selection) -> str | None:
+        """Return the node that is declared or set at a problem's place, or whose type comes from that file."""
+        place = problem.place
+        id = editing.node_at(problem, selection)
+        if id is not None or place is None or self._planned is None or editing.is_in_opened(place, selection):
             return id
         nodes = self._planned.linked.graph.nodes
-        above = [
-            (n.place.line, n.id) for n in nodes if n.place and n.place.file == place.file and n.place.line <= place.line
-        ]
-        return max(above)[1] if above else None
+        above = [n for n in nodes if n.place and n.place.file == place.file and n.place.line <= place.line]
+        last = max(above, key=lambda node: node.place.line if node.place else 0, default=None)
+        return self._node_of_file.get(place.file, last.id if last else None)
 
 
 def _nodes_by_file(planned: Planned) -> dict[str, str]:

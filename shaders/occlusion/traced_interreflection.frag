@@ -133,7 +133,8 @@ void main() {
     // At outlines the differences of depth are those of two surfaces.
     if (dot(geometric_normal, axis) < 0.25) geometric_normal = axis;
     float distance = linear_depth(depth_views[0], window_depth);
-    vec3 origin = position + geometric_normal * max(ray_offset(position, distance), snapped_by(distance));
+    vec3 leaving = geometric_normal + view_dir(depth_views[0], position);  // the latter out of creases
+    vec3 origin = position + leaving * max(ray_offset(position, distance), snapped_by(distance));
     int frame = ANIMATED * frame_index;
     vec2 shift = random_shift(pixel, frame);
     Value sum = Value(0.0);

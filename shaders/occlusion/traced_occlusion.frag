@@ -42,7 +42,8 @@ void main() {
     // At outlines the differences of depth are those of two surfaces.
     if (dot(geometric_normal, axis) < 0.25) geometric_normal = axis;
     float distance = linear_depth(depth_views[0], window_depth);
-    vec3 origin = position + geometric_normal * max(ray_offset(position, distance), snapped_by(distance));
+    vec3 leaving = geometric_normal + view_dir(depth_views[0], position);  // the latter out of creases
+    vec3 origin = position + leaving * max(ray_offset(position, distance), snapped_by(distance));
     vec2 shift = random_shift(pixel, ANIMATED * frame_index);
     for (int i = FIRST_RAY; i < PAST_RAY; ++i) {
         vec3 ray = cosine_direction(axis, shifted_point(i, shift));

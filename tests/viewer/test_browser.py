@@ -534,8 +534,16 @@ def test_what_does_not_fit_stands_back_and_a_mistake_is_said_at_its_node(show: C
     hand.page.mouse.down()
     hand.page.mouse.move(box["x"] + 20, box["y"] + 20)
     apart = "[...document.querySelectorAll('.card.apart')].map((card) => card.dataset.node)"
-    assert "display" not in hand.page.evaluate(apart)
-    assert {"sun", "shadows", "light"} <= set(hand.page.evaluate(apart))
+    found = set(hand.page.evaluate(apart))
+    assert not {"display", "light"} & found, "what fits, and where the link begins"
+    assert {"sun", "shadows"} <= found
+    card = hand.page.locator(".card[data-node=sun]").bounding_box()
+    hand.page.mouse.move(card["x"] + card["width"] / 2, card["y"] + 10)
+    hand.page.mouse.up()
+    hand.page.wait_for_selector("#link:has-text('would form a cycle')")
+    hand.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    hand.page.mouse.down()
+    hand.page.mouse.move(box["x"] + 20, box["y"] + 20)
     hand.page.mouse.up()
     hand.page.wait_for_selector("#palette .choice")
     hand.page.keyboard.press("Escape")
@@ -545,6 +553,34 @@ def test_what_does_not_fit_stands_back_and_a_mistake_is_said_at_its_node(show: C
     hand.page.wait_for_selector(".card[data-node=light]")
     hand.after(lambda: hand.page.click("#undo"))
     hand.page.wait_for_selector("#problems", state="hidden")
+
+
+@pytest.mark.nightly
+def test_small_things_answer(show: Callable[..., Hand]) -> None:
+    hand = show()
+    line = hand.page.locator("#split-below")
+    box = line.bounding_box()
+    hand.page.mouse.move(box["x"] + 100, box["y"] + 2)
+    hand.page.mouse.down()
+    hand.page.mouse.move(box["x"] + 100, box["y"] - 48, steps=4)
+    hand.page.mouse.up()
+    assert line.bounding_box()["y"] == pytest.approx(box["y"] - 50, abs=8), "the line follows the pointer"
+    hand.page.keyboard.press("?")
+    hand.page.wait_for_selector("#shortcuts[open]")
+    hand.page.keyboard.press("Escape")
+    hand.page.fill("#find", "disp")
+    hand.page.keyboard.press("Enter")
+    hand.page.wait_for_selector("[id='p-display.contrast']")
+    hand.page.fill("[id='p-display.contrast']", "99")
+    hand.page.keyboard.press("Tab")
+    assert hand.page.input_value("[id='p-display.contrast']") == "1", "what is refused does not stay"
+    pin = hand.page.locator("[data-end='light.lookup'].input").bounding_box()
+    hand.page.mouse.move(pin["x"] + pin["width"] / 2, pin["y"] + pin["height"] / 2)
+    hand.page.mouse.down()
+    hand.page.mouse.move(pin["x"] - 25, pin["y"] + 90, steps=4)
+    hand.page.mouse.up()
+    hand.after(lambda: pick(hand, "Disconnect"))
+    hand.page.wait_for_selector("[data-link='shadows.lookup → light.lookup']", state="detached")
 
 
 @pytest.mark.nightly

@@ -151,6 +151,20 @@ def test_what_is_inside_a_sub_pipeline_stays_beside_the_text(folder: Path) -> No
     assert "intensity: 0.3" in state.save("other.yaml", "")
 
 
+def test_a_type_that_lacks_a_parameter_is_saved_without_it(state: ViewState, folder: Path) -> None:
+    (folder / "mine.yaml").write_text(MINE.replace("{params: {normal_offset: 2}}", "{params: {taps: 5}}"))
+    say(state, do="set", path="shadows.type", value="shadow_vsm")
+    state.save("mine.yaml", state.draft("mine.yaml")[2])
+    assert (folder / "mine.yaml").read_text() == MINE.replace("{params: {normal_offset: 2}}", "{type: shadow_vsm}")
+
+
+def test_a_mistake_on_the_disk_is_at_its_node(folder: Path) -> None:
+    for sets in ((), ("display.saturation=0",)):
+        (folder / "mine.yaml").write_text(MINE + "  light: {params: {ambient: bright}}\n")
+        (problem,) = editing.problems_of(rg.Selection("mine.yaml", sets=sets))
+        assert problem["node"] == "light"
+
+
 def test_what_does_not_link_is_not_saved_but_kept(state: ViewState, folder: Path) -> None:
     say(state, do="edit", operations=[["add", "fx", "fxaa", {}]])
     (problem,) = editing.problems_of(state.selection)

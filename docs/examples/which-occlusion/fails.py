@@ -25,7 +25,7 @@ GAP = 8
 POSTS = (
     ("ssao-disc", ["form=disc", "samples=64", "radius=1.2"]),
     ("ssao-disc", ["samples=8", "radius=3"]),
-    ("ssil", ["samples=64", "radius=1.2"]),
+    ("ssil", ["samples=64", "radius=1.2", "thickness=0.1"]),
 )
 POST_NAMES = ("discs", "few strips", "a bitmask")
 STAIRS = ("ssao-hemisphere", "ssao-disc", "ssao-hbao", "ssao-gtao", "ssao-ssgi", "ssil")
@@ -37,7 +37,7 @@ def occlusion(session: rg.Session, pipeline: str, scene: str, size: tuple[int, i
     patch = {"outputs": {"occlusion": f"{node}.occlusion"}}
     named = [f"{node}.{one}" for one in [*sets, *(["wider=1"] if node == "gi" else [])]]
     loaded = rg.load(pipeline, scene=HERE / scene, size=size, sets=named, patches=[patch])
-    return np.asarray(session.render(loaded)["occlusion"][..., 0], np.float32)
+    return np.asarray(session.render(loaded)["occlusion"], np.float32)
 
 
 def traced(session: rg.Session) -> npt.NDArray[np.float32]:

@@ -24,6 +24,7 @@ let times = {};       // of the last still picture, by node
 const opened = new Set();  // the sub-pipelines that are open
 let folds = false;         // what the file inherits is one card for each file
 const history = [];
+const MOST_PROBLEMS = 3;  // that are shown at once
 const TABS = ["graph", "memory", "times", "changes"];
 
 const act = {
@@ -104,12 +105,15 @@ function showFigures() {
 function showProblems(extra = []) {
   const all = [...problems, ...(picture?.warnings ?? []), ...extra];
   $("problems").hidden = all.length === 0 && !state.is_behind;
-  $("problems").replaceChildren(...all.map(({ file, line, column, code, text }) => {
+  const lines = all.map(({ file, line, column, code, text, node: at }) => {
     const place = file ? `${file}${line ? `:${line}:${column}` : ""}: ` : "";
-    return h("p", { class: "mono" }, `${place}${code} ${text}`);
-  }), problems.length && picture ? h("p", {}, "Showing the last good picture.") : "",
-  state.is_behind ? h("p", {}, `${state.file} has changed on the disk since it was changed here. Save shows the difference. `,
-    h("button", { onclick: () => send({ do: "reload" }) }, "Take the file's")) : "");
+    const choose = pipeline?.nodes[at] ? h("button", { onclick: () => act.node(at) }, `Choose ${at}`) : "";
+    return h("p", { class: "mono" }, `${place}${code} ${text} `, choose);
+  });
+  const more = lines.splice(MOST_PROBLEMS);
+  $("problems").replaceChildren(...lines, more.length ? h("details", {}, h("summary", {}, `${more.length} more`), ...more) : "", problems.length && picture ? h("p", {}, "Showing the last good picture.") : "",
+  state.is_behind ? h("p", {}, `${state.file} has changed on the disk since it was changed here. “Save as…” shows what it would overwrite. `,
+    h("button", { onclick: () => send({ do: "reload" }) }, "Discard my changes and reload the file")) : "");
 }
 
 function showChanges() {
@@ -122,6 +126,8 @@ function showChanges() {
 }
 
 function askDraft() {
+  const isOwn = state.is_own && $("file").value === state.file;
+  $("saving-note").textContent = isOwn || !state.is_own ? "" : `A new file holds only the differences to ${state.file}, which it extends.`;
   if ($("saving").open) send({ do: "draft", name: $("file").value });
   else if (!$("changes").hidden && state.is_rewired) send({ do: "draft" });
 }
@@ -132,8 +138,10 @@ const flags = () => [...state.flags.map((flag) => `-s ${quote(flag)}`), ...(stat
 on("state", (facts) => { state = facts; showFrame(facts.frame); showProblems(); draw(); });  // clears a refusal
 on("pipeline", (facts) => {
   pipeline = facts;
-  node = takeAdded(pipeline.nodes) || node;
+  const added = takeAdded(pipeline.nodes);
+  node = added || node;
   draw();
+  if (added) setTimeout(() => reveal($("canvas"), added), 300);  // once it is laid out
 });
 on("picture", (facts, files) => {
   picture = facts;
@@ -161,14 +169,16 @@ on("against", (facts, files) => {
 on("pixel", (facts) => { if (facts.revision === picture?.revision) showPixel(facts); });
 on("problems", (facts) => { problems = facts.problems; showProblems(); draw(); });
 on("refused", (facts) => {
-  if ($("saving").open) $("draft").textContent = facts.problems.map((problem) => problem.text).join("\n");
-  else showProblems(facts.problems);
+  if ($("saving").open) {
+    $("draft").textContent = facts.problems.map((problem) => problem.text).join("\n");
+    $("saving-now").disabled = true;
+  } else showProblems(facts.problems);
 });
 on("saved", (facts) => {
   saved = facts.path;
   $("link").textContent = `saved ${facts.path}${state.edits.frame ? "; draw this frame with --view page" : ""}`;
 });
-on("draft", (facts) => { draft = facts; $("draft").textContent = facts.difference || "no difference"; showChanges(); });
+on("draft", (facts) => { draft = facts; $("saving-now").disabled = false; $("draft").textContent = facts.difference || "no difference"; showChanges(); });
 on("notes", (facts) => { $("link").textContent = facts.notes.join("; "); });
 on("types", showTypes);
 
@@ -232,7 +242,7 @@ function start() {
     folds = folds && !pipeline.nodes[id]?.base;
     act.node(id);
     setTimeout(() => reveal($("canvas"), id), 300);  // the layout may be another
-  });
+  }, (words) => { $("link").textContent = words; });
   startGraph($("canvas"), [[$("zoom-out"), 0.8], [$("zoom-in"), 1.25], [$("zoom-fit"), 0]]);
   startParameters($("parameters"));
   chooseTab("graph");

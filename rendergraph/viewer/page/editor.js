@@ -144,9 +144,11 @@ export function offer(place = {}) {
   const end = place.output ?? place.input;
   const title = place.link ? "Insert a node" : end ? `Add a node at ${end}` : "Add a node";
   const choices = types.map((type) => ({ type, operations: additions(type, place) })).filter(({ operations }) => operations);
-  openPalette(title, choices.map(({ type, operations }) => ({
+  const linked = place.input && inputOf(...place.input.split("."))?.links.length;
+  const disconnect = { name: "Disconnect", doc: `Remove the link of ${place.input}.`, press: () => edit(["disconnect", place.input]) };
+  openPalette(title, [...(linked ? [disconnect] : []), ...choices.map(({ type, operations }) => ({
     name: type.name, family: type.family, doc: type.doc, press: () => edit(...operations),
-  })));
+  }))]);
 }
 
 export function showTypes(facts) {
@@ -240,7 +242,18 @@ export function takeAdded(nodes) {
   return id;
 }
 
-export function startEditor(find) {
+// Say why a dragged link cannot be dropped on a node.
+export function misfit(node, { output, input }) {
+  const end = output ?? input;
+  const about = output ? outputOf(output) : inputOf(...input.split("."));
+  const loops = readersOf(output ? node : end.split(".")[0]).has(output ? end.split(".")[0] : node);
+  say(loops ? `${node} and ${end} would form a cycle` : `${node} has no ${output ? "input" : "output"} for ${end} (${about?.semantic ?? "any"})`);
+}
+
+let say = () => {};
+
+export function startEditor(find, tell) {
+  say = tell;
   $("add").onclick = () => offer();
   $("insert").onclick = insertHere;
   $("delete").onclick = deleteChosen;
@@ -248,7 +261,13 @@ export function startEditor(find) {
   $("disable").onclick = () => send({ do: "set", path: `${chosen.node}.enabled`, value: false });
   $("rename").onclick = () => { $("new-name").value = chosen.node; $("renaming").returnValue = ""; $("renaming").showModal(); $("new-name").select(); };
   $("renaming").onclose = () => { if ($("renaming").returnValue === "rename" && $("new-name").value !== chosen.node) edit(["rename", chosen.node, $("new-name").value]); };
-  $("find").onchange = () => { if (pipeline?.nodes[$("find").value]) find($("find").value); };
+  $("find").onchange = () => {
+    const words = $("find").value.trim().toLowerCase(), names = Object.keys(pipeline?.nodes ?? {});
+    const found = names.find((name) => name === $("find").value) ?? names.find((name) => name.toLowerCase().startsWith(words))
+      ?? names.find((name) => `${name} ${pipeline.nodes[name].type}`.toLowerCase().includes(words));
+    if (words && found) find(found);
+    else if (words) say(`there is no node “${words}”`);
+  };
   $("palette").addEventListener("keydown", (event) => {
     const buttons = [...$("palette-list").querySelectorAll("button")];
     const at = buttons.indexOf(document.activeElement);

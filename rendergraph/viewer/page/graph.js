@@ -1,5 +1,5 @@
 // The graph: nodes as cards in SVG, laid out by ELK.
-import { drop, fits, offer } from "./editor.js";
+import { drop, fits, misfit, offer } from "./editor.js";
 import { s, short } from "./dom.js";
 import { send } from "./socket.js";
 
@@ -176,7 +176,7 @@ function startDrag(container, event) {
   const [x0, y0] = at(start.left + start.width / 2, start.top + start.height / 2);
   const line = s("path", { class: "edge dragged" });
   svg.append(line);
-  for (const card of svg.querySelectorAll("[data-node]")) card.classList.toggle("apart", !fits(card.dataset.node, dragged));
+  for (const card of svg.querySelectorAll("[data-node]")) card.classList.toggle("apart", card !== from.closest("[data-node]") && !fits(card.dataset.node, dragged));
   const move = (now) => {
     const [x, y] = at(now.clientX, now.clientY);
     const bend = Math.max(30, Math.abs(x - x0) / 2) * (dragged.output ? 1 : -1);
@@ -194,6 +194,7 @@ function startDrag(container, event) {
     const card = under?.closest("[data-node]");
     if (card && `${Object.values(what)[0]}`.split(".")[0] === card.dataset.node) return;  // back where it began
     if (card && fits(card.dataset.node, what)) drop(card.dataset.node, what, pinned?.dataset.end.split(".")[1]);
+    else if (card) misfit(card.dataset.node, what);
     else if (!card && container.contains(under)) offer(what);
   };
   container.setPointerCapture(event.pointerId);

@@ -7,6 +7,8 @@ let held = null;     // the setting that a slider or a colour picker is moving: 
 let writing = null;  // the field that is being typed in
 let shown = { values: [], keptRow: null, newRow: null };  // the values that the fields show, the row that was not replaced, and its replacement
 
+const ROLES = { define: "A change compiles its shader again.", structural: "A change plans the pipeline again." };
+
 const set = (path, value) => {
   send({ do: "set", path, value, again: held === path });
   if (held !== null) held = path;
@@ -49,6 +51,7 @@ function numberField(path, id, about) {
     if (number.value !== "" && number.checkValidity()) set(path, Number(number.value));
     else number.reportValidity();
   });
+  number.addEventListener("blur", () => { if (number.value === "" || !number.checkValidity()) number.value = about.value; });
   const fields = [number];
   if (about.min !== null || about.kind === "number") {
     // Of an unbounded range, or one that is wide beside its default, the part around that is shown.
@@ -128,7 +131,7 @@ function row(path, label, about, changed, fields) {
     ? h("button", { class: "back", title: "Revert the change", "aria-label": `Revert ${path}`, onclick: () => send({ do: "drop", path }) }, "↺")
     : h("span");
   const idle = about.idle && `Has no effect while ${about.idle} is connected.`;
-  const tip = [idle, about.doc, about.takes && `Expects ${about.takes}.`, about.role && `(${about.role})`].filter(Boolean).join(" ");
+  const tip = [idle, about.doc, about.takes && `Expects ${about.takes}.`, ROLES[about.role]].filter(Boolean).join(" ").replaceAll("`", "");
   return h("div", { class: `parameter${changed ? " set" : ""}${idle ? " idle" : ""}`, title: tip, "data-path": path },
     h("span", {}, h("label", { for: id }, label)),
     h("span", { class: "field" }, ...fields, about.unit ? h("span", { class: "quiet" }, about.unit) : null), back);
@@ -162,7 +165,7 @@ function typeField(node, about, edits) {
   const others = about.other_types.filter((word) => word !== about.type);
   const types = h("select", { id: `p-${node}.type`, onchange: () => set(`${node}.type`, types.value) },
     ...options([...new Set([about.type, ...about.types])]),
-    others.length ? h("optgroup", { label: "with other links" }, ...options(others)) : null);
+    others.length ? h("optgroup", { label: "need other links" }, ...options(others)) : null);
   types.value = editedValue(edits, `${node}.type`, about.type);
   return types;
 }
@@ -205,6 +208,8 @@ export function showParameters(container, pipeline, node, edits, surrounding = {
   const values = [pipeline, node, JSON.stringify(edits)];
   if (values.every((value, i) => value === shown.values[i]) && (shown.keptRow === null || shown.keptRow === keptRow)) return;
   shown = { values, keptRow, newRow: null };
+  if (container.dataset.node !== node) document.getElementById("help").textContent = "";  // it is of another node
+  container.dataset.node = node;
   const focused = document.activeElement?.id;
   const parts = [];
   const about = pipeline.nodes[node];

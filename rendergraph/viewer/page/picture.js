@@ -33,7 +33,7 @@ function fit() {
   const [width, height] = size;
   const wide = matchMedia("(min-width: 1100px)").matches;
   const alone = document.body.classList.contains("picture-alone");
-  const share = alone ? 0.8 : wide ? Number(document.body.style.getPropertyValue("--picture") || 0.42) : 0.68;
+  const share = alone ? 0.8 : wide ? Number(document.body.style.getPropertyValue("--picture") || 0.36) : 0.68;
   const room = Math.min($("stage").clientWidth, (share * innerHeight * width) / height);
   const slider = $("slider");
   for (const image of [$("picture"), slider.under, slider.over]) {
@@ -203,7 +203,8 @@ export function showTexture(texture) {
     return h("div", {}, h("p", { class: "mono" }, text), bars);
   });
   const broken = texture.nan || texture.infinite
-    ? h("p", { class: "mono broken" }, `${texture.nan} texels hold NaN, ${texture.infinite} infinity`) : null;
-  const about = `${texture.semantic}, ${texture.format}, ${texture.shape.join(" × ")}`;
+    ? h("p", { class: "mono broken" }, `${texture.nan} texels are NaN, ${texture.infinite} are infinite`) : null;
+  const [channels, width, height, ...layers] = [...texture.shape].reverse();
+  const about = [texture.semantic, texture.format, `${width}×${height}`, `channels: ${channels}`, ...layers.map((count) => `layers: ${count}`)].join(", ");
   container.replaceChildren(h("h2", {}, "Texture"), h("p", { class: "mono quiet" }, about), ...[broken, ...rows].filter(Boolean));
 }

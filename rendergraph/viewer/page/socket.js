@@ -38,7 +38,8 @@ export function connect() {
     dispatch(facts.kind, facts, files);
   };
   socket.onclose = () => {
-    $("link").textContent = "connection lost, reconnecting …";
+    const again = delay > 2000 ? " If the server was started again, open the address that it printed." : "";
+    $("link").textContent = `Connection lost, reconnecting …${again}`;
     setTimeout(connect, delay);
     delay = Math.min(delay * 2, 5000);
   };
