@@ -15,6 +15,9 @@ from typing import Any
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from images.layout import Layout, laid_out  # how the documentation's pictures are put together
+
 import rendergraph as rg
 from rendergraph import images
 from rendergraph.compare import compare
@@ -74,7 +77,7 @@ def main() -> None:
     from tempfile import TemporaryDirectory
 
     names = [*WAYS, "16 pixels"]
-    rows: list[Any] = []
+    panels: list[Any] = []
     before: list[list[str]] = []
     behind: list[list[str]] = []
     cost: list[str] = []
@@ -99,14 +102,14 @@ def main() -> None:
                 behind.append([scene.stem + moment, *(rmse(each, curved) for each in pictures), rmse(truth, curved)])
                 if not moment:
                     tiles = [each[CROP].repeat(ENLARGED, 0).repeat(ENLARGED, 1) for each in (*pictures, truth)]
-                    padding = ((0, GAP), (0, GAP), (0, 0))
-                    rows.append(np.hstack([np.pad(tile, padding, constant_values=1) for tile in tiles]))
+                    panels += [encoded(tile) for tile in tiles]
     for heads, table in ((names, before), ([*names, "truth"], behind)):
         print(f"| RMSE | {' | '.join(heads)} |\n|---|{'---|' * len(heads)}")
         print("\n".join(f"| {' | '.join(line)} |" for line in table))
     print(f"| ms a frame | {' | '.join(cost)} |")
     if len(sys.argv) > 1:
-        images.write(Path(sys.argv[1]), encoded(np.vstack(rows)))
+        labels = [*names, "path traced"]
+        images.write(Path(sys.argv[1]), laid_out(panels, Layout(len(labels), GAP, labels)))
 
 
 if __name__ == "__main__":
