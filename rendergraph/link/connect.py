@@ -112,7 +112,7 @@ class Connector(Struct, eq=False):
         draft.failed.update(missing)
 
     def _source_for(self, draft: UnlinkedNode, port: Input | InOut) -> str:
-        wanted = port.semantic
+        wanted, found = port.semantic, list[tuple[str, str]]()
         for other in self.spec.nodes.values():
             if other.scope != draft.spec.scope or other.id == draft.spec.id or other.type not in self.catalog:
                 continue
@@ -124,6 +124,9 @@ class Connector(Struct, eq=False):
                 meant = getattr(candidate, "signature", None) or getattr(candidate, "semantic", None)
                 kind = getattr(candidate, "kind", port.kind)
                 if wanted is not None and meant is not None and (meant.name, kind) == (wanted.name, port.kind):
-                    return f"; '{other.id.removeprefix(other.scope)}.{name}' would fit"
+                    found.append((name, f"'{other.id.removeprefix(other.scope)}.{name}'"))
+        if found:  # one of the input's own name is what is usually meant
+            best = [end for name, end in found if name == port.name] or [end for _, end in found]
+            return f"; {' or '.join(best[:3])} would fit"
         what = f"{wanted.name}()" if isinstance(wanted, Signature) else wanted.name if wanted else "anything"
         return f"; it expects {what}"

@@ -51,9 +51,20 @@ def describe_python(topic: str) -> dict[str, Any]:
         files = sorted(shared_includes().glob("*.glsl"))
         return {"topic": "glsl", "includes": {file.name: _functions(file.read_text("utf-8")) for file in files}}
     names = public_names()
-    if topic not in names or not (inspect.isclass(names[topic]) or callable(names[topic])):
+    if (thing := names.get(topic)) is None:
         return {}
-    thing = names[topic]
+    if not callable(thing):  # what a port carries
+        says = [getattr(thing, "declaration", ""), getattr(thing, "doc", "")]
+        return (
+            {
+                "name": topic,
+                "signature": f"{type(thing).__name__} {thing.name}",
+                "doc": "\n".join(filter(None, says)),
+                "members": [],
+            }
+            if any(says)
+            else {}
+        )
     members = public_members(thing) if inspect.isclass(thing) else ()
     return {
         "name": topic,

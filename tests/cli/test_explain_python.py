@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 import rendergraph as rg
@@ -39,3 +41,20 @@ def test_a_mistake_in_a_notebook_is_one_message() -> None:
 def test_a_node_without_a_port_is_not_a_tap() -> None:
     with pytest.raises(InputError, match=r"'light' is a node, not a port; write one of .*light\.radiance"):
         rg.load("forward").expand(taps="light")
+
+
+def test_what_ports_carry_is_explained() -> None:
+    """Meanings of textures, and functions that shaders call."""
+    assert reference.describe_python("ShadowLookup")["doc"].startswith(
+        "float shadow(int light, vec3 position, vec3 normal)"
+    )
+    assert "near plane" in reference.describe_python("Depth")["doc"]
+
+
+def test_the_output_of_the_inputs_own_name_is_offered_first(tmp_path: Path) -> None:
+    """Lighting nodes declare the parts of radiance before the whole."""
+    file = tmp_path / "no-link.yaml"
+    nodes = "nodes:\n  light: {type: forward_lighting}\n  display: {type: tonemap}\n"
+    file.write_text(f"rendergraph: 1\nscene: shapes\n{nodes}outputs: {{image: display.color}}\n")
+    with pytest.raises(InputError, match="is not connected; 'light.radiance' would fit"):
+        rg.load(file).link()
