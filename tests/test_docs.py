@@ -424,10 +424,11 @@ def test_the_comparison_is_what_the_files_give(gl: Any, tmp_path: Path, monkeypa
     for result in found.results:
         row = re.search(rf"^{result.name} +(.*)$", text, re.MULTILINE)
         assert row is not None, f"README's table lacks {result.name}"
-        flip, rmse, psnr, ssim, *_, passes, size, unit = row[1].split()
+        flip, rmse, relative, psnr, ssim, *_, passes, size, unit = row[1].split()
         m = result.metrics
         for shown, value in ((flip, m.flip), (rmse, m.rmse), (ssim, m.ssim)):
             assert float(shown) == pytest.approx(value, abs=5e-4)
+        assert float(relative) == pytest.approx(result.relative_mse, rel=0.05, abs=1e-6)
         assert psnr == "∞" if m.psnr is None else float(psnr) == pytest.approx(m.psnr, abs=0.2)
         assert int(passes) == result.pass_count
         assert unit == "MiB"

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 CONFIGS = (".ocio", ".ocioz")
 """Extensions of OpenColorIO's configurations, whose looks apply to scene-linear light."""
 MOST_ENTRIES = 256, 16384
-"""Along each side of a table of colours, and of a table of each channel."""
+"""Maximum number of entries along each side of a table of colours, and of a curve per channel."""
 BAKED_SIDE = 65
 DARKEST, RANGE = 2.0**-10, 17
 """Scene-linear values are spaced by log2(value / DARKEST + 1), up to DARKEST · 2^RANGE; as in `look.glsl`."""
@@ -32,7 +32,7 @@ class Look(Struct, frozen=True, eq=False):
 
     Attributes:
         table: float32, (n, n, n, 3) by blue, green and red, or (n, 3), a curve for each channel.
-        low, high: colours of its first and last entry.
+        low, high: colours of the table's first and last entry.
         is_linear: whether it takes and gives scene-linear light in the spacing above, before the tone curve; otherwise
             display-encoded colours after it.
     """
@@ -79,9 +79,9 @@ def _of_cube(file: InputFile) -> Look:
             continue
         if words[0][0].isalpha() and words[0].lower() not in ("nan", "inf"):
             if rows:
-                raise _wrong(file, number, f"'{words[0][:30]}' comes behind the first row of the table")
+                raise _wrong(file, number, f"'{words[0][:30]}' comes after the first row of the table")
             if words[0] in head:
-                raise _wrong(file, number, f"'{words[0][:30]}' is there twice")
+                raise _wrong(file, number, f"'{words[0][:30]}' occurs twice")
             head[words[0]] = number, words[1:]
             continue
         first = first or number
@@ -96,19 +96,19 @@ def _of_cube(file: InputFile) -> Look:
     is_cube = sizes[0] == "LUT_3D_SIZE"
     most = MOST_ENTRIES[0 if is_cube else 1]
     if len(words) != 1 or not words[0].isdecimal() or not 2 <= int(words[0]) <= most:
-        raise _wrong(file, number, f"{sizes[0]} is a whole number from 2 to {most}")
+        raise _wrong(file, number, f"{sizes[0]} must be a whole number from 2 to {most}")
     side = int(words[0])
     low_key, high_key = "DOMAIN_MIN", "DOMAIN_MAX"
     if (span := sizes[0].replace("SIZE", "INPUT_RANGE")) in head:  # as DaVinci Resolve writes both for all channels
         number, words = head[span]
         if len(words) != 2 or low_key in head or high_key in head:
-            raise _wrong(file, number, f"{span} is two numbers in place of {low_key} and {high_key}")
+            raise _wrong(file, number, f"{span} takes two numbers and replaces {low_key} and {high_key}")
         head |= {low_key: (number, words[:1] * 3), high_key: (number, words[1:] * 3)}
     low = _row(file, *head.get(low_key, (0, ["0"] * 3)))
     high = _row(file, *head.get(high_key, (0, ["1"] * 3)))
     if not all(a < b for a, b in zip(low, high, strict=True)):
         number = head.get(high_key, head.get(low_key, (1, [])))[0]
-        raise _wrong(file, number, "the domain does not begin below its end")
+        raise _wrong(file, number, "the start of the domain is not below its end")
     expected = side**3 if is_cube else side
     if len(rows) != expected:
         end = len(text.splitlines())
@@ -199,6 +199,6 @@ def _baked(file: InputFile, result: oiio.ImageBuf) -> Floats:
 
 
 def _reason(text: str) -> str:
-    """Return what the first reader for the file's extension says, where several have tried."""
+    """Return the message of the first reader for the file's extension, if several have tried."""
     parts = re.split(r"'[^']*' failed with: ", text)
     return textwrap.shorten(parts[min(1, len(parts) - 1)], 200, placeholder=" …") or "OpenColorIO cannot read it"

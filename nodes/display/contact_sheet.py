@@ -19,7 +19,7 @@ class ContactSheet(Node):
     """Arrange pictures in a grid with labels, row by row from the upper left, each as large as its cell allows.
 
     Larger pictures are reduced by averaging texels in linear light; the texels of smaller ones are shown as squares.
-    Textures that are no display colour are shown unchanged, from 0 to 1, those of one channel in grey.
+    Textures that do not hold display colours are shown unchanged, from 0 to 1, and in grey if they have one channel.
     """
 
     pictures = Input(AnyTexel, many=True, size="any", doc="Up to 12 pictures, in this order.")
@@ -29,7 +29,7 @@ class ContactSheet(Node):
         default=0, min=0, max=_MAX_PICTURES, doc="Pictures per row; 0: about as many rows as columns."
     )
     labels: tuple[str, ...] = structural(
-        default=(), doc="A text for each picture, of capital letters and digits; none by default."
+        default=(), doc="A label for each picture, of capital letters and digits; none by default."
     )
     gap: int = structural(default=4, unit="texels", min=0, max=256, doc="Space between pictures.")
     background: float = param(default=0.02, min=0, max=1, doc="Grey between pictures, display-linear.")
@@ -38,7 +38,7 @@ class ContactSheet(Node):
         """Record one step that draws all pictures."""
         inputs = steps.facts.inputs["pictures"]
         if len(inputs) > _MAX_PICTURES:
-            raise SceneError(f"it is given {len(inputs)} pictures; a sheet has up to {_MAX_PICTURES}")
+            raise SceneError(f"it has {len(inputs)} pictures; a sheet holds up to {_MAX_PICTURES}")
         if len(self.labels) > len(inputs):
             raise SceneError(f"it has {len(self.labels)} labels for {len(inputs)} pictures")
         texts = [*self.labels, *[""] * (len(inputs) - len(self.labels))]

@@ -10,7 +10,7 @@ from ._texel_types import texel_macros
 class Crop(Node):
     """Cut the picture out of one that was drawn with a guard band around it.
 
-    Texels are copied, except for velocity, which is rescaled to widths and heights of the smaller picture. The result
+    Texels are copied, except for velocity, which is rescaled to the width and height of the smaller picture. The result
     belongs to the pipeline's camera again, so depth and normals can be used by further passes, too.
     """
 
@@ -22,7 +22,7 @@ class Crop(Node):
         """Record one step, with a sampler and target of the source's type."""
         source, target = steps.desc(self.source), steps.desc(self.cropped)
         if source.width < target.width or source.height < target.height:
-            raise SceneError("what is cropped is smaller than the picture; draw it with a `guard_band`", "source")
+            raise SceneError("the source is smaller than the picture; draw it with a `guard_band`", "source")
         band = (source.width - target.width) // 2, (source.height - target.height) // 2
         macros = texel_macros(source)
         if steps.facts.input("source").semantic == Velocity:

@@ -10,14 +10,14 @@ from ._half_size import half_radiance_size
 from ._mip_means import fill_mips
 
 BINS, BINS_PER_STOP, FIRST_STOP = 256, 8, -16
-"""The histogram reaches from 2^-16 to 2^16; what is outside counts in the first or last bin."""
+"""The histogram reaches from 2^-16 to 2^16; values outside it count in the first or last bin."""
 
 
 class Exposure(Node):
-    """Compute the exposure that maps the picture's average luminance to the key, with an eye that adapts over time.
+    """Compute the exposure that maps the picture's average luminance to the key, adapting over time like an eye.
 
     `method: histogram` meters as cameras do. It averages the stops of the pixels between two percentiles of luminance,
-    so that neither black surroundings nor small lamps decide, and can weight the centre more.
+    so that neither black surroundings nor small lamps dominate, and can weight the centre more.
 
     With `method: log_average`, the average is `exp(mean(log(delta + L)))` (Reinhard, Stark, Shirley and Ferwerda 2002),
     in which a few very bright pixels have little weight. The mean is the last level of a mip chain of exact area means
@@ -25,7 +25,7 @@ class Exposure(Node):
 
     With `before` connected to this node's own `luminance@previous`, the adapted luminance follows the picture's
     exponentially (`L += (target - L) (1 - exp(-dt / seconds))`; Pattanaik et al. 2000), faster towards light than
-    towards the dark. In the first frame it is `start`, or the picture's own luminance.
+    towards dark. In the first frame it is `start`, or the picture's own luminance.
     """
 
     radiance = Input(Radiance, size="any", doc="Scene-linear radiance; alpha is coverage.")
@@ -58,21 +58,21 @@ class Exposure(Node):
         unit="%",
         min=0,
         max=100,
-        doc="`histogram`: this share of the pixels, the darkest, does not count.",
+        doc="`histogram`: the darkest pixels, up to this share, do not count.",
     )
     high_percentile: float = param(
         default=90.0, unit="%", min=0, max=100, doc="`histogram`: pixels brighter than this share do not count."
     )
     center_weight: float = param(
-        default=0.5, min=0, max=1, doc="`histogram`: 0 counts all places equally, 1 hardly counts the corners."
+        default=0.5, min=0, max=1, doc="`histogram`: 0 weights all pixels equally, 1 almost ignores the corners."
     )
     limit: float = param(
-        default=32.0, unit="EV", min=0, max=32, doc="Most stops that the exposure may differ from a gain of 1."
+        default=32.0, unit="EV", min=0, max=32, doc="Largest deviation of the exposure from a gain of 1."
     )
     compensation: float = param(
         default=0.0, unit="EV", min=-16, max=16, doc="Stops added at the end, as a photographer does for snow."
     )
-    transparent: bool = define(default=False, doc="Meter only what surfaces cover: nothing is behind them.")
+    transparent: bool = define(default=False, doc="Meter only surfaces: the picture has no background.")
     start: float = param(default=0.0, min=0, doc="Adapted luminance in the first frame; 0: that of the picture.")
     seconds_to_light: float = param(
         default=0.4, unit="s", min=0, max=600, doc="Time constant towards brighter pictures; 0: at once."

@@ -16,7 +16,9 @@ class GaussianBlur(Node):
     blurred = Output(like="source", size="source", doc="The blurred picture.")
     blurred_x = Internal(like="source", size="source")
 
-    radius: int = param(default=6, unit="texels", min=0, max=128, doc="Three standard deviations; 0: no blur.")
+    radius: int = param(
+        default=6, unit="texels", min=0, max=128, doc="Radius of the kernel, three standard deviations; 0: no blur."
+    )
 
     def record(self, steps: Steps) -> None:
         """Record the horizontal and the vertical blur."""

@@ -19,18 +19,19 @@ def _tiles(node: MotionBlur, facts: Facts) -> tuple[int, int]:
 
 
 class MotionBlur(Node):
-    """Blur what moves while the camera's shutter is open.
+    """Blur surfaces that move while the camera's shutter is open.
 
-    Each pixel gathers along the fastest motion in its neighbourhood, which three small passes find in tiles (McGuire,
-    Hennessy, Bukowski and Osman 2012), and along its own (Guertin, McGuire and Nowrouzezahrai 2014). Depth tells which
-    samples are of nearer surfaces that pass over the pixel, and which show what its own surface uncovers.
+    Each pixel gathers samples along the fastest motion in its neighbourhood, which three small passes find in tiles
+    (McGuire, Hennessy, Bukowski and Osman 2012), and along its own motion (Guertin, McGuire and Nowrouzezahrai 2014).
+    Depth separates samples of nearer surfaces that pass over the pixel from samples of the background that its own
+    surface uncovers.
 
     With `weights: exposure` a sample counts by the share of the exposure in which its surface covers the pixel. A
     uniform motion of one surface is then exactly the box filter of the shutter, and the blurred edge of a nearer
     surface the exact linear ramp. `weights: cones` are those of the paper of 2012, which fall off with the distance.
 
-    The motion is taken as straight and as fast as since the previous frame; the first frame has none. Without a
-    shutter (`shutter` of the scene's camera) the node does nothing and costs nothing.
+    Motion is assumed to be linear, at the speed since the previous frame; the first frame has none. Without a shutter
+    (`shutter` of the scene's camera) the node does nothing and costs nothing.
     """
 
     radiance = InOut(Radiance, doc="Scene-linear radiance, which is blurred.")
@@ -52,16 +53,19 @@ class MotionBlur(Node):
         default=0.05,
         min=0.002,
         max=0.25,
-        doc="Most that a point may be blurred to each side, in heights of the picture.",
+        doc="Largest blur of a point to each side, in heights of the picture.",
     )
     jitter: float = param(
-        default=1.0, min=0, max=1, doc="Random shift of a pixel's samples, in steps between them: noise for banding."
+        default=1.0,
+        min=0,
+        max=1,
+        doc="Random shift of a pixel's samples, in steps between them; turns banding into noise.",
     )
     depth_tolerance: float = param(
         default=0.01,
         min=1e-5,
         max=1,
-        doc="Difference in distance, relative to it, over which a surface counts as nearer.",
+        doc="Relative difference in distance at which a surface fully counts as nearer.",
     )
 
     def reach(self, height: int) -> int:
@@ -99,5 +103,5 @@ class MotionBlur(Node):
         )
 
     def update(self, frame: Frame) -> None:
-        """Follow a shutter that keyframes move."""
+        """Update the shutter, which keyframes may animate."""
         frame.set_uniform("shutter", float(frame.scene.camera.shutter))

@@ -1,4 +1,4 @@
-"""Overdraw: how many fragments or lights each pixel costs."""
+"""Overdraw: the number of fragments or lights per pixel."""
 
 from __future__ import annotations
 
@@ -50,7 +50,10 @@ class Overdraw(Node):
 
     counted: Literal["fragments", "lights"] = structural(default="fragments", doc="What is counted.")
     top: int = param(
-        default=8, min=2, max=64, doc="The count with the last colour of the legend; larger ones have it, too."
+        default=8,
+        min=2,
+        max=64,
+        doc="The count with the last colour of the legend; larger counts have the same colour.",
     )
 
     def record(self, steps: Steps) -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from rendergraph.api import Any, DisplayColor, Input, Internal, Node, Output, Steps, define, param
 
 MAX_REACH = 32
-"""The largest number of texels that an edge is searched to each side."""
+"""The largest number of texels to search along an edge on each side."""
 
 
 class SMAA(Node):
-    """Smooth the edges of a finished picture by their patterns.
+    """Smooth the edges of a finished picture according to their patterns.
 
     The orthogonal part of subpixel morphological antialiasing (Jimenez, Echevarria, Sousa and Gutierrez 2012), in three
     steps: detection of edges in the luma; search for both ends and the crossing edges there, which determine the line
@@ -27,9 +27,11 @@ class SMAA(Node):
     dominance: float = param(
         default=2.0, min=1, max=100, doc="Edges next to one that is stronger by this factor are dropped."
     )
-    reach: int = param(default=16, min=1, max=MAX_REACH, unit="texels", doc="How far an edge is searched to each side.")
+    reach: int = param(
+        default=16, min=1, max=MAX_REACH, unit="texels", doc="How far to search along an edge on each side."
+    )
 
-    transparent: bool = define(default=False, doc="Smooth alpha, too, by which colours are multiplied.")
+    transparent: bool = define(default=False, doc="Smooth alpha, too; colours are premultiplied by it.")
 
     def record(self, steps: Steps) -> None:
         """Record the table, edge detection, weights and blending."""

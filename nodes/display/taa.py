@@ -20,7 +20,7 @@ class Taa(Node):
     surfaces that are no longer visible. While nothing moves, it is a plain mean: n frames have n samples per pixel. The
     first frame is unchanged.
 
-    The node follows the display transform, where averages match perception, in place of `fxaa`.
+    The node comes after the display transform, where averages match perception, and replaces `fxaa`.
     """
 
     source = Input(DisplayColor, doc="The finished picture, display-referred.")
@@ -38,7 +38,7 @@ class Taa(Node):
         max=16,
         doc="How far the history may differ from the mean of the neighbourhood, in standard deviations.",
     )
-    transparent: bool = structural(default=False, doc="Average alpha, too, by which colours are multiplied.")
+    transparent: bool = structural(default=False, doc="Average alpha, too; colours are premultiplied by it.")
 
     def record(self, steps: Steps) -> None:
         """Record one pass over the picture."""
@@ -58,7 +58,7 @@ class Taa(Node):
 
 
 def _halton(index: int, base: int) -> float:
-    """Return a number of the Halton sequence (1960), the radical inverse of its index, less ½."""
+    """Return a number of the Halton sequence (1960), the radical inverse of its index, minus ½."""
     value, digit = 0.0, 1.0
     while index:
         digit /= base

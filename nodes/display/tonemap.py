@@ -1,7 +1,7 @@
 """Tone mapping.
 
-This node is a class, although one shader would do: a header cannot declare choices that plugins add to, and every
-pipeline uses this node, so that each start would import the reader of headers.
+This node is a class, although a shader with a header would suffice: a header cannot declare choices that plugins
+extend, and every pipeline uses this node, so each start would import the reader of headers.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from ._look import Look
 
 ACES2_SIDE = 65
-"""Entries of the table of `aces2` along each channel: then 99 % of the values are within a step of 8 bits."""
+"""Entries of the table of `aces2` along each channel; with this many, 99 % of the values are within an 8-bit step."""
 
 
 def _look_side(node: PlainAny, facts: Facts) -> int:
@@ -48,15 +48,16 @@ class Tonemap(Node):
     base colours below 0.8 unchanged. Others work on each channel, so that bright colours fade to white: `reinhard` is
     x/(1+x), `aces` is Narkowicz's fit (2015), `hable` is Hable's filmic curve (2010). `agx` (Sobotka 2022, in Blender's
     form) and `aces2` (the output transform of ACES 2.0, 2024, which OpenColorIO computes into a table) do the same
-    without bending hues. `none` clips.
+    without shifting hues. `none` clips.
 
     White balance is a von Kries adaptation in the cone space of Bradford (Lam 1985). Both whites are blackbodies (fit
     by Kim et al. 2002), so 6500 K changes nothing.
 
-    A `look` is a table of colours. Tables in files (`.cube`, and what else OpenColorIO reads: `.3dl`, `.csp`, `.clf`,
-    `.cdl` and so on) take and give display colours, as photo editors apply them: after the tone curve and the transfer
-    function. A configuration of OpenColorIO (`.ocio`) has looks with names. They apply to scene-linear light with the
-    primaries of Rec. 709, after exposure and before the tone curve. Tables of colours are interpolated tetrahedrally.
+    A `look` is a table of colours. Tables in files (`.cube`, and other formats that OpenColorIO reads: `.3dl`, `.csp`,
+    `.clf`, `.cdl` and so on) take and give display colours, as photo editors apply them: after the tone curve and the
+    transfer function. A configuration of OpenColorIO (`.ocio`) has looks with names. They apply to scene-linear light
+    with the primaries of Rec. 709, after exposure and before the tone curve. Tables of colours are interpolated
+    tetrahedrally.
 
     The picture has 8 bits per channel, which show as bands in slow gradients. `dither` adds a fraction of a step before
     rounding, the same at a pixel in all frames and pictures: equal values stay equal, exact 8-bit values are unchanged,
@@ -94,7 +95,7 @@ class Tonemap(Node):
         format="rgba32f",
         size=lambda node, facts: (_look_side(node, facts), 1),
         kept=True,
-        doc="A look that maps each channel by itself.",
+        doc="A look that maps each channel separately.",
     )
 
     exposure: float = param(default=0.0, unit="EV", min=-32, max=32, doc="Stops added before the curve.")
@@ -105,7 +106,9 @@ class Tonemap(Node):
         max=25000,
         doc="Colour temperature of the light that is to look white, as on a camera; below 6500 the picture gets bluer.",
     )
-    contrast: float = param(default=1.0, min=0, max=4, doc="Slope in stops around middle grey (0.18), which stays.")
+    contrast: float = param(
+        default=1.0, min=0, max=4, doc="Slope in stops around middle grey (0.18), which is unchanged."
+    )
     saturation: float = param(default=1.0, min=0, max=4, doc="0 is grey, 1 leaves colours as they are.")
     curve: (
         Literal[
@@ -125,7 +128,7 @@ class Tonemap(Node):
         min=0.01,
         doc="Luminance after exposure that `reinhard_extended` maps to white; brighter light clips.",
     )
-    dither: bool = define(default=True, doc="Break up the bands of 8 bits by a pattern that is the same in all frames.")
+    dither: bool = define(default=True, doc="Break up 8-bit banding by a pattern that is the same in all frames.")
 
     def loaded_look(self) -> Look | None:
         """Return the look, None without one.
@@ -137,7 +140,7 @@ class Tonemap(Node):
             if self.look_name:
                 raise ValueError("'look_name' needs a 'look': a configuration (.ocio, .ocioz)")
             return None
-        from ._look import load_look  # for looks alone
+        from ._look import load_look  # only for looks
 
         return load_look(self.look, self.look_name)
 
@@ -150,7 +153,7 @@ class Tonemap(Node):
         reads: dict[str, PlainAny] = {}
         defines: dict[str, int] = {}
         if "curve_table" in steps.needs("curve"):
-            from ._aces2 import table  # OpenColorIO, for this curve alone
+            from ._aces2 import table  # OpenColorIO, only for this curve
 
             steps.upload(self.curve_table, table(ACES2_SIDE), label="table")
             reads["curve_table"] = self.curve_table.sampled("linear")

@@ -27,7 +27,7 @@ class SurfaceTexture:
         default: what readers use if it is not connected; such an input is optional.
         needs: a word of `#pragma needs`; only shading models with it read the texture, all if it is empty.
         unless: words of shading models that do not read it.
-        is_relevant: whether it matters for an object; if for no opaque object, it is not read.
+        is_relevant: whether an object needs it; if no opaque object does, it is not read.
     """
 
     semantic: Semantic

@@ -19,7 +19,7 @@ class GBuffer(Node):
     Deferred lighting reads it as a group (`gbuffer: gbuffer`); textures that are not used are not drawn. `compact`
     takes 32 bytes per pixel for `pbr`; its coarsest channels are the square root of the base colour, with 10 bits each.
     `full` uses float32, 84 bytes, and shows what that precision costs. Positions are reconstructed from `depth` and its
-    view. It contains no transparent surfaces, because a pixel has one surface.
+    view. A G-buffer contains no transparent surfaces, because it has one surface per pixel.
     """
 
     view = Input(View, kind="view", optional=True, doc="The view; the pipeline's camera by default.")

@@ -41,7 +41,7 @@ class Hemicube(Node):
         camera = replace(frame.camera, jitter=(0.0, 0.0))  # no jitter
         near = camera.near
         if camera.projection[3, 3] == 1:
-            raise SceneError("a hemicube stands around an eye, and this camera is orthographic; take `guard_band`")
+            raise SceneError("a hemicube needs a perspective camera, but this camera is orthographic; use `guard_band`")
         to_world = np.linalg.inv(camera.view)
         right, up, forward, eye = to_world[:3, 0], to_world[:3, 1], -to_world[:3, 2], to_world[:3, 3]
         full_frustum = projection.frustum(-near, near, -near, near, near, camera.far)

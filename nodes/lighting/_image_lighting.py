@@ -21,9 +21,10 @@ def gbuffer_samples(_node: Any, facts: Facts) -> int:
 class ImageLighting(SurfaceLighting):
     """Base of the deferred lighting nodes. The textures of the G-buffer are one group of inputs.
 
-    Textures that the shading model does not need are not read, and so not drawn either. A G-buffer contains no
-    transparent surfaces: they are drawn over the picture as by `forward_lighting`, tested against its depth. With a
-    multisampled G-buffer each sample is lit, unless the node does otherwise, and the picture has as many samples.
+    Textures that the shading model does not need are not read, and therefore not rendered either. A G-buffer contains
+    no transparent surfaces: they are drawn over the picture as by `forward_lighting`, tested against the G-buffer's
+    depth. With a multisampled G-buffer each sample is lit, unless the node does otherwise, and the picture has as many
+    samples.
     """
 
     depth = Input(
@@ -44,7 +45,7 @@ class ImageLighting(SurfaceLighting):
     background: Color = param(default=0.0, min=0, glsl="vec3", doc="Radiance of the background, a number or RGB.")
 
     def gbuffer_reads(self, steps: Steps) -> dict[str, Any]:
-        """Return what `gbuffer_surface.glsl` reads for the node's shading model."""
+        """Return the inputs of `gbuffer_surface.glsl` for the node's shading model."""
         needs = set(steps.needs("shading"))
         if "grain_where_any" in needs and any(entry.grain and not entry.blended for entry in steps.facts.objects):
             needs.add("grain")
@@ -58,15 +59,15 @@ class ImageLighting(SurfaceLighting):
         return {"PER_SAMPLE": 1} if steps.desc(self.depth).samples > 1 else {}
 
     def shadow_reads(self, steps: Steps) -> dict[str, Any]:
-        """Return what `shadow()` reads."""
+        """Return the inputs of `shadow()`."""
         return _connected(steps, [self.lookup, self.visibility] if self.wants_lights(steps) else [])
 
     def direct_reads(self, steps: Steps) -> dict[str, Any]:
-        """Return what direct lighting by several lights reads: shadows and lists of lights."""
+        """Return the inputs of direct lighting by several lights: shadows and lists of lights."""
         return self.shadow_reads(steps) | self.light_list_reads(steps)
 
     def ambient_reads(self, steps: Steps) -> dict[str, Any]:
-        """Return what ambient lighting reads: the environment, reflections that replace it, and the occlusion."""
+        """Return the inputs of ambient lighting: the environment, reflections that replace it, and the occlusion."""
         return super().ambient_reads(steps) | _connected(
             steps, [self.occlusion] if self.terms in ("all", "ambient") else []
         )
@@ -76,7 +77,7 @@ class ImageLighting(SurfaceLighting):
         return {"BACKDROP": 1} if draws_backdrop(self, steps.facts) else {}
 
     def draw_layered(self, steps: Steps) -> None:
-        """Light again the opaque surfaces that have layers, such as a coat: a G-buffer has none."""
+        """Light opaque surfaces with layers, such as a coat, once more: a G-buffer stores no layers."""
         is_physical = {"phong", "nothing"}.isdisjoint(steps.needs("shading"))
         layered = [one for one in steps.facts.objects if one.layers and not one.blended and not one.hidden]
         objects = [one.name for one in layered if is_physical or "shadow_catcher" in one.layers]

@@ -49,7 +49,7 @@ Color = float | tuple[float, float, float]
 
 
 def has_layer(facts: Facts, *layers: str) -> bool:
-    """Return whether a material of an object that is drawn has one of these layers."""
+    """Return whether the material of a drawn object has one of these layers."""
     return any(layer in placed.layers for placed in facts.objects if not placed.hidden for layer in layers)
 
 
@@ -67,7 +67,7 @@ _OLD_METHODS = {
     "shadows_on_blended": "transparent_shadows",
     "surface": "gbuffer_reads",
 }
-DIFFUSE = "The same radiance without the specular part and without air, which lights other surfaces."
+DIFFUSE = "The same radiance without its specular part and without air: the light that reaches other surfaces."
 
 
 class Lighting(Node):
@@ -83,13 +83,13 @@ class Lighting(Node):
         Air,
         kind="function",
         optional=True,
-        doc="Air between the viewer and everything that the node draws, the background included: fog, for instance.",
+        doc="Air, such as fog, between the viewer and everything that the node draws, including the background.",
     )
     light_list = Input(
         LightList,
         kind="function",
         optional=True,
-        doc="Lists of the lights that may reach a position; unconnected, every surface is lit by all lights.",
+        doc="Lists of the lights that may reach a position. Unconnected: all lights light every surface.",
     )
     brdf_table = Internal(
         format=lambda node, facts: "rgba16" if has_layer(facts, "sheen") else "rg16",
@@ -101,12 +101,12 @@ class Lighting(Node):
     behind = Internal(
         format="rgba16f",
         mips=0,
-        doc="The picture without the surfaces that transmit light, and its mean over ever larger blocks.",
+        doc="The picture without the surfaces that transmit light, with mip levels.",
     )
 
     shading: Literal["unlit", "phong", "blinn_phong", "anisotropic", "pbr"] | str = define(
         default="pbr",
-        doc="Shading model: Cook-Torrance (`pbr`), always with its anisotropic formulas, or an empirical model.",
+        doc="Shading model: Cook-Torrance (`pbr`), its anisotropic form for all surfaces, or an empirical model.",
         choices="shading",
         needs=("nothing", "phong", "grain", "grain_where_any"),
     )
@@ -116,7 +116,7 @@ class Lighting(Node):
     )
     diffuse_lobe: Literal["lambert", "shared"] = define(
         default="lambert",
-        doc="Diffuse lobe of `pbr`: of all the light, or of the share that the specular lobe does not reflect.",
+        doc="Diffuse lobe of `pbr`: reflects all light, or only the share that the specular lobe does not reflect.",
     )
     terms: Literal["all", "ambient", "diffuse", "specular", "emissive"] = define(
         default="all", doc="Show a single term; the four terms add up to `all`."
@@ -137,11 +137,11 @@ class Lighting(Node):
         doc="Add environment light that is scattered several times between the microfacets of rough surfaces.",
     )
     specular_occlusion: bool = define(
-        default=True, doc="Occlude the specular environment light less than the diffuse one on smooth surfaces."
+        default=True, doc="On smooth surfaces, occlude specular environment light less than diffuse light."
     )
     transparent: bool = structural(
         default=False,
-        doc="Leave out what is behind all surfaces, and let alpha say how much they cover, glass in part.",
+        doc="Leave out the background, and write the coverage of surfaces to alpha; glass covers partially.",
     )
 
     if not TYPE_CHECKING:
@@ -165,7 +165,7 @@ class Lighting(Node):
             steps.fullscreen("brdf_table.frag", out=self.brdf_table, defines=defines, label="table")
 
     def environment_reads(self, steps: Steps) -> dict[str, Any]:
-        """Return what a shader reads for environment lighting; nothing if it would not contribute."""
+        """Return the shader inputs for environment lighting; none if it would not contribute."""
         needs = steps.needs("shading")
         if not steps.connected(self.environment) or "nothing" in needs or self.terms not in ("all", "ambient"):
             return {}
@@ -174,17 +174,17 @@ class Lighting(Node):
         return {"environment": self.environment, **table}
 
     def ambient_reads(self, steps: Steps) -> dict[str, Any]:
-        """Return what a shader reads for ambient lighting: the environment."""
+        """Return the shader inputs for ambient lighting: the environment."""
         return self.environment_reads(steps)
 
     def energy_reads(self, steps: Steps) -> dict[str, Any]:
-        """Return what a shader reads to leave to the diffuse lobe what the specular lobe does not reflect."""
+        """Return the shader inputs that give the diffuse lobe the light that the specular lobe does not reflect."""
         needs = steps.needs("shading")
         shares = self.diffuse_lobe == "shared" and "phong" not in needs and "nothing" not in needs
         return {"brdf_table": self.brdf_table.sampled("linear")} if shares else {}
 
     def layer_reads(self, steps: Steps) -> dict[str, Any]:
-        """Return what a shader reads to light the layers of materials: the albedo of sheen."""
+        """Return the shader inputs for lighting the layers of materials: the albedo of sheen."""
         needs = steps.needs("shading")
         is_physical = "phong" not in needs and "nothing" not in needs
         reads = is_physical and has_layer(steps.facts, "sheen")
@@ -196,17 +196,17 @@ class Lighting(Node):
         fill_mips(steps, self.behind, "behind")
 
     def air_reads(self, steps: Steps) -> dict[str, Any]:
-        """Return what a shader reads for the air in front of what it draws."""
+        """Return the shader inputs for the air in front of the surfaces that it draws."""
         return {"air": self.air} if steps.connected(self.air) else {}
 
     def light_list_reads(self, steps: Steps) -> dict[str, Any]:
-        """Return what a shader reads to light a surface by some of the lights."""
+        """Return the shader inputs for lighting a surface by some of the lights."""
         return {"light_list": self.light_list} if self.wants_lights(steps) and steps.connected(self.light_list) else {}
 
     def lighting_reads(self, steps: Steps, shadows: Port) -> dict[str, Any]:
-        """Return what a shader reads that lights geometry while drawing it.
+        """Return the inputs of a shader that lights geometry while drawing it.
 
-        This is the environment, the air, shadow functions and lists of lights.
+        They are the environment, the air, shadow functions and lists of lights.
         """
         reads = self.environment_reads(steps) | self.energy_reads(steps) | self.air_reads(steps)
         reads |= self.layer_reads(steps)
@@ -285,7 +285,7 @@ PARTS = ("direct_diffuse", "direct_specular", "environment_reflection", "specula
 
 
 def _of_radiance(node: Node, facts: Facts, field: str, default: Any) -> Any:
-    """Return what the node's `radiance` declares, such as its format; a default where it declares nothing."""
+    """Return a property that the node's `radiance` declares, such as its format, or the default."""
     declared = getattr(node.outputs().get("radiance"), field, None)
     value = declared(node, facts) if callable(declared) else declared
     return default if value is None else value
@@ -302,13 +302,13 @@ def part_samples(node: Node, facts: Facts) -> int:
 
 
 def mirror_view(picture_view: Callable[[Frame], ViewMatrices]) -> Views:
-    """Declare the view that sees what the ground mirrors in a picture of this view."""
+    """Declare the view that shows the reflections in the ground for a picture with this view."""
     return Views(
         count=lambda node, facts: int(has_layer(facts, "shadow_catcher")),
         size=0.5,
         public=False,
         compute=lambda frame: [mirrored_view(picture_view(frame), ground_height(frame))],
-        doc="The view that sees what the ground mirrors.",
+        doc="The view that shows the reflections in the ground.",
     )
 
 
@@ -322,11 +322,11 @@ class SurfaceLighting(Lighting):
     Screen-space visibility, occlusion and reflections are known only for the opaque surface of each pixel, so they do
     not apply to transparent surfaces in front of it.
 
-    The light is also available in parts, which cost nothing unless they are used. On opaque surfaces, seen through no
-    `air`, the picture is `radiance` = `diffuse` + `direct_specular` + `environment_reflection` × `specular_albedo`. Of
-    `diffuse`, the part that is not emission is the diffuse reflectance × `irradiance` / π, and `direct_diffuse` is the
-    part of the lights alone. Transparent surfaces are blended over the radiances; they dim `specular_albedo` and leave
-    `environment_reflection` and `irradiance` as they are.
+    The light is also available in parts, which cost nothing unless they are used. On opaque surfaces without `air` in
+    front of them, the picture is `radiance` = `diffuse` + `direct_specular` + `environment_reflection` ×
+    `specular_albedo`. Without emission, `diffuse` is the diffuse reflectance × `irradiance` / π; `direct_diffuse` is
+    the part of it that comes from the lights. Transparent surfaces are blended over the radiances; they dim
+    `specular_albedo` and leave `environment_reflection` and `irradiance` as they are.
     """
 
     visibility = Input(
@@ -336,8 +336,8 @@ class SurfaceLighting(Lighting):
     reflections = Input(
         Reflections,
         optional=True,
-        doc="Reflected radiance, which replaces the environment's in the specular lobe by its confidence (alpha). It "
-        "is not occluded.",
+        doc="Reflected radiance. Weighted by its confidence (alpha), it replaces that of the environment in the "
+        "specular lobe. It is not occluded.",
     )
     blended_lookup = Input(
         ShadowLookup,
@@ -354,17 +354,17 @@ class SurfaceLighting(Lighting):
         mips=0,
         view="mirror_view",
         clear=0.0,
-        doc="What the ground mirrors, and its mean over ever larger blocks.",
+        doc="Reflections in the ground, with mip levels.",
     )
     mirrored_depth = Internal(Depth, format="depth32f", size=0.5, view="mirror_view", clear=0.0)
 
-    direct_diffuse = _part("Radiance of diffusely reflected light of the lights.")
-    direct_specular = _part("Radiance of specularly reflected light of the lights.")
+    direct_diffuse = _part("Radiance from the lights, reflected diffusely.")
+    direct_specular = _part("Radiance from the lights, reflected specularly.")
     environment_reflection = _part(
         "Occluded radiance of the environment in the opaque surface's specular lobe, or `reflections` in its place."
     )
     specular_albedo = _part(
-        "Fraction of it that the opaque surface reflects to the viewer: the factor f0 A + f90 B of the split sum.",
+        "Fraction of that radiance that the opaque surface reflects to the viewer: f0 A + f90 B of the split sum.",
         Reflectance,
     )
     irradiance = _part(
@@ -379,14 +379,14 @@ class SurfaceLighting(Lighting):
         default=0.0,
         min=0,
         max=1,
-        doc="Blur of the backdrop: the roughness of a surface that would reflect it so.",
+        doc="Blur of the backdrop, as the roughness of a surface that would blur its reflection as much.",
     )
     blended: bool = structural(
         default=True, doc="Draw transparent surfaces, too; otherwise a `forward_transparent` can draw them."
     )
 
     def record(self, steps: Steps) -> None:
-        """Record the BRDF table and what the ground mirrors, if the picture shows them."""
+        """Record the BRDF table and the reflections in the ground, if the picture shows them."""
         super().record(steps)
         if not self.mirrors_ground(steps):
             return
@@ -418,7 +418,7 @@ class SurfaceLighting(Lighting):
         return {name: ports[name] for name in ("radiance", *used)}
 
     def ambient_reads(self, steps: Steps) -> dict[str, Any]:
-        """Return what a shader reads for ambient lighting: the environment and the reflections that replace it."""
+        """Return the shader inputs for ambient lighting: the environment and the reflections that replace it."""
         reads = self.environment_reads(steps)
         if "phong" in steps.needs("shading") or "nothing" in steps.needs("shading"):
             return reads  # these models have no specular light of the environment
@@ -429,7 +429,7 @@ class SurfaceLighting(Lighting):
         return reads
 
     def catcher_reads(self, steps: Steps) -> dict[str, Any]:
-        """Return what a shader reads to show on shadow catchers what is behind them; nothing without any."""
+        """Return the shader inputs for the background on shadow catchers; none if there are no catchers."""
         if not has_layer(steps.facts, "shadow_catcher"):
             return {}
         if shows_environment(self, steps.facts):
@@ -500,7 +500,7 @@ def shows_environment(node: SurfaceLighting, facts: Facts) -> bool:
 
 
 def draws_backdrop(node: SurfaceLighting, facts: Facts) -> bool:
-    """Return whether a step of its own draws the background: the environment, or anything that is seen through air."""
+    """Return whether a separate step draws the background: the environment, or anything that is seen through air."""
     return shows_environment(node, facts) or facts.connected("air")
 
 
@@ -524,7 +524,7 @@ def rendered_samples(node: GeometryLighting, facts: Facts) -> int:
 class GeometryLighting(SurfaceLighting):
     """Base of the forward lighting nodes, which light geometry while drawing it.
 
-    `record` draws opaque surfaces with `draw_opaque`, in as many passes as the technique takes, and ends with
+    `record` draws opaque surfaces with `draw_opaque`, in as many passes as the technique needs, and ends with
     `draw_backdrop_and_transparent`.
     """
 
@@ -549,7 +549,7 @@ class GeometryLighting(SurfaceLighting):
     background: Color = structural(default=0.0, min=0, doc="Radiance of the background, a number or RGB.")
     samples: Samples = structural(
         default=1,
-        doc="Samples per pixel: smooth triangle edges, with lighting once per pixel. 1 takes those of `depth`.",
+        doc="Samples per pixel for smooth triangle edges; each pixel is lit once. 1 takes the sample count of `depth`.",
     )
 
     def targets(self, steps: Steps) -> dict[str, Port]:

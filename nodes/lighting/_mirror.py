@@ -1,4 +1,4 @@
-"""What a ground that catches shadows mirrors of the objects on it."""
+"""Reflections of objects in the ground under them, a shadow catcher."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from rendergraph.api import Frame, ViewMatrices
 
 
 def ground_height(frame: Frame) -> float:
-    """Return y of the ground in metres: the scene's last shadow catcher."""
+    """Return the y coordinate of the ground, the scene's last shadow catcher, in metres."""
     return float(frame.scene.corners[frame.scene.catchers[-1]][:, 1].max())
 
 
 def mirrored_view(view: ViewMatrices, height: float) -> ViewMatrices:
     """Return the view of a camera at the mirror image of the eye in a horizontal plane.
 
-    It sees what the plane mirrors. Its picture is flipped left to right, as by a camera: a reflected view matrix would
-    turn the winding of triangles round. A point of the plane lies at the same place of both pictures but for the flip.
+    It sees what the plane mirrors. Its picture is flipped left to right, because a reflected view matrix would reverse
+    the winding of triangles. Apart from this flip, points of the plane are at the same place in both pictures.
 
     Args:
         view: the view of the picture, perspective or orthographic.
-        height: of the plane, y in metres.
+        height: y coordinate of the plane, in metres.
     """
     mirror = np.diag([1.0, -1.0, 1.0, 1.0])
     mirror[1, 3] = 2 * height

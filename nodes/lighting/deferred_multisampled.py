@@ -36,11 +36,11 @@ class DeferredMultisampled(DeferredLighting):
     A G-buffer cannot be averaged before lighting, because the mean of two surfaces is not a surface. Lighting every
     sample is correct, but multiplies the cost by the sample count, although in most pixels all samples lie on one
     triangle. Therefore pixels whose samples differ in depth, normal or material are marked in the stencil (Lauritzen
-    2010). Every pixel is lit once, and marked pixels are lit per sample. Shadow edges within a surface do not show in
-    a G-buffer. To find them, visibility is looked up at two samples on opposite sides of each pixel's centre, which
+    2010). Every pixel is lit once, and marked pixels are lit per sample. Shadow edges within a surface do not show in a
+    G-buffer. To find them, visibility is looked up at two samples on opposite sides of each pixel's centre, which
     alternate from pixel to pixel. Where the two differ, or those of a neighbour, the pixel is marked, too; elsewhere
     their mean is used. The picture matches that of `deferred_lighting`, which lights every sample. With one sample per
-    pixel, this node is that one.
+    pixel, both nodes are identical.
     """
 
     edges = Output(AnyTexel, format="r8", doc="1 in pixels that are lit per sample, else 0.")

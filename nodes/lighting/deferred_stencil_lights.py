@@ -17,11 +17,11 @@ class DeferredStencilLights(ImageLighting):
     """Light the surfaces of a G-buffer, evaluating each point and spot light only on the pixels within its volume.
 
     The volume is a sphere around a point light or a spherical sector around a spot light, with the light's range as
-    radius, or without a range the extent of the view frustum. Its faces behind the surface increment and decrement
-    the stencil, so that a nonzero value marks surfaces inside the volume, wherever the eye is (z-fail, Bilodeau and
-    Songy 1999). Then its back faces are drawn where the stencil is not zero, which also resets it for the next light.
-    Directional and ambient light take one full-screen pass. The cost is V + ΣF', while `deferred_lighting` renders the
-    same picture for V + L F.
+    radius, or without a range the extent of the view frustum. Its faces behind the surface increment and decrement the
+    stencil, so that a nonzero value marks surfaces inside the volume, wherever the eye is (z-fail, Bilodeau and Songy
+    1999). Then its back faces are drawn where the stencil is not zero, which also resets it for the next light.
+    Directional and ambient light take one full-screen pass. The geometry costs V, and each light only the F' pixels in
+    its volume: V + ΣF'. `deferred_lighting` renders the same picture for V + L F, with L lights and F pixels.
     """
 
     radiance = Output(

@@ -25,7 +25,7 @@ _MAX_AUTO_LAYERS = 8
 
 
 def max_layers(facts: Facts) -> int:
-    """Return an upper bound of the transparent surfaces along a ray, from the shapes of all objects."""
+    """Return an upper bound on the number of transparent surfaces along a ray, from the shapes of all objects."""
     return sum(one.most_layers for one in facts.drawn("transparent"))
 
 
@@ -34,13 +34,12 @@ class DepthPeeling(ForwardTransparent):
 
     Each pass draws all transparent surfaces and keeps the nearest fragment behind the previous layer. The layers are
     peeled off from front to back (Everitt 2001) and composited under each other. Intersecting surfaces are ordered per
-    pixel, which sorting objects cannot do. The number of layers asked for is exact; surfaces behind them are missing.
-    There are no more passes than the scene's surfaces can have layers, and once a pass draws nothing, the device skips
-    the remaining ones.
+    pixel, which sorting objects cannot do. The requested layers are exact; surfaces behind them are missing. There are
+    no more passes than the scene can have layers, and once a pass draws nothing, the device skips the remaining ones.
     """
 
     depth = Input(
-        Depth, samples="any", doc="Depth of the opaque surfaces, which hide what is behind them, with its view."
+        Depth, samples="any", doc="Depth of the opaque surfaces, with its view; hides transparent surfaces behind them."
     )
     peeled = Output(
         Radiance,

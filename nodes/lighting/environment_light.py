@@ -95,7 +95,7 @@ class ImageBasedLight(Node):
         size=_cube_size,
         mips=0,
         kept=True,
-        doc="The environment as a cube map, which lobes are sampled from.",
+        doc="The environment as a cube map, from which lobes are sampled.",
     )
     specular = Output(
         Radiance,
@@ -149,7 +149,7 @@ class ImageBasedLight(Node):
 
     size: int = structural(default=128, min=16, max=1024, unit="texels", doc="Side of the cube map's faces.")
     mips: int = structural(
-        default=6, min=3, max=12, doc="Levels of roughness from 0 to 1, with one more halfway between each two."
+        default=6, min=3, max=12, doc="Levels of roughness from 0 to 1; another level lies halfway between each two."
     )
     samples: int = define(default=64, min=8, max=1024, doc="Samples per texel, for lobes that are sampled.")
     integrated_from: float = structural(
@@ -167,7 +167,7 @@ class ImageBasedLight(Node):
     )
     window: bool = define(
         default=True,
-        doc="Damp the harmonics just enough that the irradiance is not negative opposite of a strong light.",
+        doc="Damp the harmonics just enough that the irradiance is not negative opposite a strong light.",
     )
 
     def record(self, steps: Steps) -> None:

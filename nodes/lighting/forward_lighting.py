@@ -19,7 +19,7 @@ class ForwardLighting(GeometryLighting):
 
     `evaluate` sets how often lighting is computed: per fragment (Phong 1975), per vertex with interpolated colours
     (Gouraud 1971), or once per face with its normal (flat shading). Textures, shadows and `reflections` are always per
-    fragment. Vertices and faces are lit by all lights, whatever the `light_list`.
+    fragment. Vertices and faces are lit by all lights, regardless of the `light_list`.
     """
 
     evaluate: Literal["fragment", "vertex", "face"] = define(default="fragment", doc="How often lighting is computed.")
@@ -28,11 +28,11 @@ class ForwardLighting(GeometryLighting):
         """Record a pass over opaque surfaces and one over transparent ones.
 
         Raises:
-            SceneError: a part of the light is used that only lighting per fragment has.
+            SceneError: an output is used that only lighting per fragment provides.
         """
         for part in (self.environment_reflection, self.specular_albedo):
             if self.evaluate != "fragment" and steps.used(part):
-                raise SceneError(f"'{part.name}' is known per fragment; set evaluate: fragment", part.name)
+                raise SceneError(f"'{part.name}' is only available per fragment; set `evaluate: fragment`", part.name)
         super().record(steps)
         shaders: dict[str, Any] = {
             "fragment": {"fragment": "forward_lighting.frag"},
@@ -51,5 +51,5 @@ class ForwardLighting(GeometryLighting):
         self.draw_backdrop_and_transparent(steps, **shaders, in_place=True)
 
     def light_list_reads(self, steps: Steps) -> dict[str, Any]:
-        """Return what a shader reads to light a surface by some of the lights; nothing for vertices and faces."""
+        """Return the shader inputs for lighting a surface by some of the lights; none for vertices and faces."""
         return super().light_list_reads(steps) if self.evaluate == "fragment" else {}

@@ -14,7 +14,7 @@ class HeightFog(Node):
     (Wenzel, "Real-time Atmospheric Effects in Games", 2006). The transmittance is exp(-integral). Every part of the fog
     scatters the radiance `color` to the viewer, so the in-scattered radiance is `color` × (1 - transmittance).
 
-    Connect `air` to every lighting node that draws what stands in the fog. It begins at the pipeline's camera.
+    Connect `air` to every lighting node that draws surfaces in the fog. The fog begins at the pipeline's camera.
     """
 
     air = Function(Air, "height_fog.glsl", doc="In-scattered radiance and transmittance from the camera to a position.")
@@ -24,6 +24,10 @@ class HeightFog(Node):
         default=0.0, unit="m", min=-1e4, max=1e4, doc="World-space height (y) at which `density` is measured."
     )
     falloff: float = param(
-        default=0.3, unit="1/m", min=0, max=100, doc="Relative decrease of density per metre of height; 0 is even fog."
+        default=0.3,
+        unit="1/m",
+        min=0,
+        max=100,
+        doc="Relative decrease of density per metre of height; 0 is uniform fog.",
     )
     color: Color = param(default=0.5, min=0, glsl="vec3", doc="Radiance of dense fog, a number or RGB.")

@@ -23,24 +23,24 @@ from rendergraph.api import (
 from ..occlusion._screen_space import ReducedResolution, reduced_size
 from ._lighting import Lighting
 
-_MOST_RAYS = 80  # of a pixel in one step: drivers limit how long a step takes, and llvmpipe how often its loops turn
+_MOST_RAYS = 80  # per pixel and step: drivers limit the duration of a step, and llvmpipe the iterations of its loops
 
-_PLANE = 0.5  # metres, of which a tenth is how far from a pixel's plane the texels may lie that it is interpolated from
+_PLANE = 0.5  # metres; a pixel is interpolated from texels within a tenth of this from its plane
 
 
 class TracedReflections(Lighting, ReducedResolution):
     """Trace rays in the directions that surfaces reflect to the viewer.
 
-    Each of `samples` rays leaves in a direction that the surface's GGX lobe reflects, chosen among the microfacet
-    normals that the viewer sees (Heitz 2018). The surface that it meets is lit as a lighting node would light it: by
-    one of the lights, chosen by its share, with a shadow ray, by the environment, and by its own emission. A ray that
-    meets nothing brings the light of the environment. Glass that it meets passes light straight on, without refraction.
+    Each of `samples` rays takes a direction from the surface's GGX lobe, by sampling the visible microfacet normals
+    (Heitz 2018). The surface that it hits is lit as a lighting node would light it: by one of the lights, chosen by its
+    share, with a shadow ray; by the environment; and by its own emission. A ray that hits nothing receives the light of
+    the environment. Glass lets rays pass straight through, without refraction.
 
-    Lighting nodes take `reflections` in place of the environment's specular light, by the confidence in alpha. This is
-    1 up to a roughness of three quarters of `max_roughness`, where it begins to fall to 0; rougher surfaces have no
-    rays. The material comes from the scene, so the depth of a pre-pass is enough. `animated` traces other rays in each
-    frame, for a mean over frames by `accumulate`; `denoise` smooths a single frame. At a reduced `scale`, which needs
-    `normal`, fewer pixels are traced, and the others interpolated.
+    Lighting nodes take `reflections` in place of the environment's specular light, weighted by the confidence in alpha.
+    It is 1 up to a roughness of three quarters of `max_roughness` and falls to 0 at `max_roughness`; rougher surfaces
+    trace no rays. The material comes from the scene, so the depth of a pre-pass is enough. `animated` traces different
+    rays in each frame, which `accumulate` averages; `denoise` smooths a single frame. At a reduced `scale`, which needs
+    `normal`, fewer pixels are traced, and the others are interpolated.
     """
 
     lookup = DROPPED
@@ -61,16 +61,16 @@ class TracedReflections(Lighting, ReducedResolution):
 
     samples: int = define(default=4, min=1, max=1024, doc="Rays per pixel.")
     max_roughness: float = param(
-        default=1.0, min=0, max=1, doc="Surfaces rougher than this have no rays; with 1, all surfaces have."
+        default=1.0, min=0, max=1, doc="Surfaces rougher than this trace no rays; at 1, all surfaces do."
     )
-    animated: bool = define(default=True, doc="Trace other rays in each frame, for a mean over frames.")
+    animated: bool = define(default=True, doc="Trace different rays in each frame, to be averaged over frames.")
 
     def ambient_reads(self, steps: Steps) -> dict[str, Any]:
-        """Return what the shader reads for ambient lighting: the environment, and always the BRDF table."""
+        """Return the shader inputs for ambient lighting: the environment, and always the BRDF table."""
         return super().ambient_reads(steps) | {"brdf_table": self.brdf_table.sampled("linear")}
 
     def record(self, steps: Steps) -> None:
-        """Record the BRDF table, the rays in several steps, and the way to full size."""
+        """Record the BRDF table, the rays in several steps, and the upsampling."""
         super().record(steps)
         is_reduced = steps.connected(self.normal) and bool(self.size_defines(steps))
         macros = self.size_defines(steps) if is_reduced else {}

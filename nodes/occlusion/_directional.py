@@ -15,8 +15,8 @@ class DirectionalSampling(ScreenSpaceOcclusion):
     """Base of the techniques that sample surfaces along directions on the screen, from near to far.
 
     Every pixel rotates its directions and jitters its steps in one of 16 ways, and 4×4 pixels on one surface share
-    their results: four within the pass, four such quads in the next. Some techniques compute a vector (indirect light
-    or a bent normal) besides ambient visibility.
+    their results: a quad of four within the pass, and four such quads in the next pass. Some techniques compute a
+    vector (indirect light or a bent normal) besides ambient visibility.
     """
 
     unfiltered = Internal(format="r16f", size=reduced_size)
@@ -27,10 +27,12 @@ class DirectionalSampling(ScreenSpaceOcclusion):
     samples: int = define(
         default=32, min=8, max=128, doc="Samples per pixel, rounded down to a whole number of directions."
     )
-    animated: bool = define(default=False, doc="Sample other directions in each frame, for `accumulate` to average.")
+    animated: bool = define(
+        default=False, doc="Sample different directions in each frame, which `accumulate` averages."
+    )
 
     def plane_tolerance(self) -> float:
-        """Return how far from a plane its texels may lie, in metres."""
+        """Return how far the texels of a plane may lie from it, in metres."""
         return 0.1 * self.radius
 
     def sample_and_filter(
@@ -95,7 +97,7 @@ class DirectionalSampling(ScreenSpaceOcclusion):
 
 
 class RefinedDirectionalSampling(RefinedOcclusion, DirectionalSampling):
-    """Base of those that work at two sizes, with no other filter than the mean over blocks."""
+    """Base of the techniques that work at two sizes, with no other filter than the mean over blocks."""
 
     marked = Internal(format="r32f", size=reduced_size)
     marked_vector = Internal(format="rgba16_snorm", size=reduced_size)
@@ -106,7 +108,7 @@ class RefinedDirectionalSampling(RefinedOcclusion, DirectionalSampling):
         default=0.06,
         min=0,
         max=1,
-        doc="With `refine`, the largest change of slope over two reduced pixels to each side that is interpolated.",
+        doc="With `refine`, the largest change of slope, over two reduced pixels on each side, that is interpolated.",
     )
 
     def sample_and_filter(
@@ -119,7 +121,7 @@ class RefinedDirectionalSampling(RefinedOcclusion, DirectionalSampling):
         defines: Mapping[str, int] | None = None,
         **reads: Any,
     ) -> None:
-        """Record surfaces, sampling and mean at the reduced size, then both again where that is not enough."""
+        """Record surfaces, sampling and mean at the reduced size, then the latter two at full size where needed."""
         if not self.refines(steps):
             super().sample_and_filter(steps, fragment, out, has_vector=has_vector, defines=defines, **reads)
             return

@@ -35,7 +35,10 @@ class Interreflection(DirectionalSampling):
     normal = Input(Normal, group="gbuffer", doc="Unit normal, world space.")
     albedo = Input(AlbedoRoot, group="gbuffer", doc="Square root of the base colour, which is the diffuse reflectance.")
     material = Input(
-        Material, group="gbuffer", optional=True, doc="Metal reflects no diffuse light. Unconnected: nothing is metal."
+        Material,
+        group="gbuffer",
+        optional=True,
+        doc="Metal reflects no diffuse light. Unconnected: no surface is metal.",
     )
     diffuse = Input(Radiance, doc="Diffuse radiance that leaves surfaces.")
     radiance = InOut(Radiance, doc="The lit picture, to which reflected light is added.")
@@ -43,17 +46,20 @@ class Interreflection(DirectionalSampling):
         Radiance,
         format="rgba16f",
         size="depth",
-        doc="Irradiance from other surfaces, over π: what a white surface would reflect.",
+        doc="Irradiance from other surfaces, over π: the radiance that a white surface would reflect.",
     )
     reflected = Output(
-        Radiance, format="rgba16f", size="depth", doc="Light that surfaces reflect of it: `diffuse` of the next bounce."
+        Radiance,
+        format="rgba16f",
+        size="depth",
+        doc="The part of `indirect` that surfaces reflect: `diffuse` of the next bounce.",
     )
 
     denoise: int = structural(
         default=3,
         min=0,
         max=5,
-        doc="Passes of a filter over light on the same surface; each reaches twice as far as the one before.",
+        doc="Passes of a filter over light on the same surface; each reaches twice as far as the previous one.",
     )
 
     def reflect_indirect(self, steps: Steps, **options: Any) -> None:
@@ -61,7 +67,7 @@ class Interreflection(DirectionalSampling):
 
         Args:
             steps: the recorder.
-            options: further arguments of the step that adds it.
+            options: further arguments of the step that adds it to the picture.
         """
         reads: dict[str, Any] = {"indirect": self.indirect, "albedo": self.albedo}
         if steps.connected(self.material):

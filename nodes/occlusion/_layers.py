@@ -1,4 +1,4 @@
-"""The layers of what a filter reads and writes."""
+"""The layers of a filter's sources and targets."""
 
 from __future__ import annotations
 

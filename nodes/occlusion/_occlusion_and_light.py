@@ -10,10 +10,10 @@ from ._interreflection import Interreflection
 
 
 class OcclusionAndLight(Interreflection):
-    """Base of the techniques with one set of samples for both.
+    """Base of the techniques that compute occlusion and indirect light from one set of samples.
 
     Indirect light needs the lit picture, so occlusion comes too late for the lighting node. These nodes add ambient
-    light themselves, and that of the lighting node must be 0.
+    light themselves; the ambient light of the lighting node must be 0.
     """
 
     twin = "traced_occlusion_and_light"
@@ -22,7 +22,7 @@ class OcclusionAndLight(Interreflection):
         Occlusion, format="r16", size="depth", doc="Ambient visibility: 1 open, 0 occluded; 1 for background."
     )
 
-    wider: float = param(default=5.0, min=1, max=100, doc="Radius of light, as a multiple of that of occlusion.")
+    wider: float = param(default=5.0, min=1, max=100, doc="Radius of light, as a multiple of the radius of occlusion.")
     ambient: float | tuple[float, float, float] = param(
         default=0.03, min=0, glsl="vec3", doc="Radiance from all sides, a number or RGB, scaled by the occlusion."
     )

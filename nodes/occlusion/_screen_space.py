@@ -23,14 +23,14 @@ from rendergraph.api import (
 
 
 def reduced_size(node: Any, facts: Facts) -> tuple[int, int]:
-    """`scale` times the size of `depth`, rounded up."""
+    """Return `scale` times the size of `depth`, rounded up."""
     desc = facts.input("depth").desc
     assert desc is not None
     return math.ceil(desc.width * node.scale), math.ceil(desc.height * node.scale)
 
 
 class ReducedResolution(Node):
-    """Base of the techniques that compute something for each pixel of the picture, or for fewer and interpolate."""
+    """Base of the techniques that compute a value for every pixel, or for fewer pixels and interpolate the others."""
 
     depth = Input(Depth, doc="Window depth; positions come from it and its view.")
     normal = Input(Normal, doc="Unit normal, world space.")
@@ -84,7 +84,7 @@ class ReducedResolution(Node):
 
 
 class ScreenSpaceOcclusion(ReducedResolution):
-    """Base of the techniques that know the scene only by depth and normals of the picture.
+    """Base of the techniques that know the scene only from the picture's depth and normals.
 
     `record` calls `gather_surfaces` first, then computes occlusion at the reduced size, and passes it to `upsample` if
     that is not the picture's size.

@@ -13,11 +13,11 @@ from ._layers import layers_of
 class Accumulate(Node):
     """Average a noisy picture over frames, with each surface reprojected to the previous frame.
 
-    Of the four nearest texels there, those count that showed the same surface: in the same plane, with a similar normal
-    (the temporal half of Schied et al., "Spatiotemporal Variance-Guided Filtering", 2017). Where none did, because the
-    surface was hidden or outside the picture, the mean starts again. The noise of the source must differ between frames
-    (`animated` of the occlusion nodes). If the light on a surface changes, the mean follows within as many frames as it
-    averages.
+    Of the four nearest texels there, only those that showed the same surface count: in the same plane, with a similar
+    normal (the temporal half of Schied et al., "Spatiotemporal Variance-Guided Filtering", 2017). Where none did,
+    because the surface was hidden or outside the picture, the mean restarts. The noise of the source must differ
+    between frames (`animated` of the occlusion nodes). If the light on a surface changes, the mean follows within as
+    many frames as it averages.
     """
 
     source = Input(AnyTexel, layered=True, doc="The noisy picture, or several as layers.")
@@ -33,10 +33,10 @@ class Accumulate(Node):
     tolerance: float = param(
         default=0.02, min=1e-6, max=1, doc="How far from its plane a surface may have been, relative to its distance."
     )
-    facing: float = param(default=0.9, min=-1, max=1, doc="Least cosine between its normals in both frames.")
+    facing: float = param(default=0.9, min=-1, max=1, doc="Least cosine between a surface's normals in both frames.")
 
     def record(self, steps: Steps) -> None:
-        """Record one pass over each layer of the picture; the first one keeps what the surfaces are."""
+        """Record one pass over each layer of the picture; the first one stores the surfaces for the next frame."""
         reads: dict[str, Any] = {"depth": self.depth, "normal": self.normal}
         if steps.connected(self.velocity):
             reads["velocity"] = self.velocity

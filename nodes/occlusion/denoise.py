@@ -25,9 +25,11 @@ class Denoise(Node):
     even = Internal(format="rgba16f", size="depth")
 
     passes: int = structural(
-        default=3, min=1, max=6, doc="Each reaches twice as far as the one before, the first one texel."
+        default=3, min=1, max=6, doc="Number of passes. The first reaches one texel, each further one twice as far."
     )
-    tolerance: float = param(default=0.05, unit="m", min=1e-6, max=1e6, doc="How far from a plane its texels may lie.")
+    tolerance: float = param(
+        default=0.05, unit="m", min=1e-6, max=1e6, doc="How far texels may lie from the pixel's plane."
+    )
 
     def record(self, steps: Steps) -> None:
         """Record the surfaces and the passes."""

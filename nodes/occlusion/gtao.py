@@ -12,11 +12,11 @@ class GTAO(RefinedDirectionalSampling):
 
     Ground-truth ambient occlusion (Jiménez, Wu, Pesce and Jarabo, "Practical Real-Time Strategies for Accurate Indirect
     Occlusion", 2016). Depth is interpreted as a height field, and the hemisphere is divided into slices through the
-    view direction. Each has two horizons, and the light between them has a closed form. Where the picture shows all
-    occluders, the result is that of ray tracing.
+    view direction. Each slice has two horizons, and the light between them has a closed form. Where the picture shows
+    all occluders, the result is that of ray tracing.
 
-    Occluders count in full up to the radius, where they end at once. A `falloff` lets them end gradually, which hides
-    where the radius ends on a large surface.
+    Occluders count in full up to the radius, and not at all beyond it. A `falloff` fades them out gradually, which
+    hides the edge of the radius on large surfaces.
 
     Interreflection brightens corners. `albedo` approximates it by the paper's fit, for surroundings of this colour.
     """
@@ -29,7 +29,7 @@ class GTAO(RefinedDirectionalSampling):
     )
 
     falloff: float = param(
-        default=0.0, min=0, max=1, doc="Share of the radius over which occluders count less and less towards its end."
+        default=0.0, min=0, max=1, doc="Share of the radius, at its end, over which occluders fade out."
     )
     albedo: float = param(default=0.0, min=0, max=1, doc="Grey albedo of the surroundings; 0: they reflect no light.")
 

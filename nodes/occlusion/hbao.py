@@ -11,9 +11,9 @@ class HBAO(RefinedDirectionalSampling):
     """Compute ambient occlusion from the elevation of the horizon.
 
     Horizon-based ambient occlusion (Bavoil and Sainz, "Image-Space Horizon-Based Ambient Occlusion", 2008): depth is
-    interpreted as a height field. Along each direction, samples that rise above the tangent plane and above all samples
-    before raise the horizon, and occlude by the increase of its sine. The sky is weighted uniformly, not by the cosine
-    as in `gtao`, which makes contacts too dark.
+    interpreted as a height field. Along each direction, samples that rise above the tangent plane and above all
+    previous samples raise the horizon, and occlude by the increase of its sine. The sky is weighted uniformly,
+    whereas `gtao` weights it by the cosine, so contacts are too dark.
     """
 
     attenuation: float = param(

@@ -12,13 +12,13 @@ from ._directional import RefinedDirectionalSampling
 class SSAODisc(RefinedDirectionalSampling):
     """Compute ambient occlusion from samples in a disc on the screen.
 
-    Each sample stands for a strip of its surface, from half-way to the sample before to half-way to the one after, and
+    Each sample stands for a strip of its surface, from halfway to the previous sample to halfway to the next one, and
     `thickness` deep. The occlusion of a strip has a closed form (Jimenez et al., "Practical Real-Time Strategies for
-    Accurate Indirect Occlusion", 2016), and the parts that strips before it occlude count once.
+    Accurate Indirect Occlusion", 2016), and parts that earlier strips already occlude count once.
 
     With `form: disc` a sample stands for a disc in space (Bunnell, "Dynamic Ambient Occlusion and Indirect Lighting",
-    2005). Discs behind nearer ones of the same direction occlude nothing; surfaces near the tangent plane occlude too
-    much, and the occlusion of large near surfaces is limited.
+    2005). Discs hidden by nearer ones in the same direction occlude nothing; surfaces near the tangent plane occlude
+    too much, and the occlusion of large near surfaces is limited.
     """
 
     samples: int = define(
@@ -27,7 +27,7 @@ class SSAODisc(RefinedDirectionalSampling):
     form: Literal["strip", "disc"] = structural(
         default="strip", doc="What a sample stands for: a strip of a slice, or a disc in space."
     )
-    thickness: float = param(default=0.6, min=0, max=1e6, doc="Thickness of all surfaces in radii; unused by discs.")
+    thickness: float = param(default=0.6, min=0, max=1e6, doc="Thickness of all surfaces, in radii; discs ignore it.")
 
     def record(self, steps: Steps) -> None:
         """Record sampling and filtering."""

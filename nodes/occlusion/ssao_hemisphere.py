@@ -16,13 +16,13 @@ class SSAOHemisphere(RefinedOcclusion):
 
     The original screen-space ambient occlusion (Mittring, "Finding Next Gen", 2007). A point behind the surface at its
     texel is assumed to lie inside an object, and its ray to be occluded; occlusion decreases with the difference of
-    depth, to 0 at four radii. Rays are spread by least energy, cosine-weighted, and reflected at a random vector of a
-    64×64 noise texture, another one at every pixel. Each ray has one point within a fifth of the radius, and three up
-    to the radius, or to where the ray leaves the picture. Quads of four pixels are averaged, and a bilateral blur
-    removes the remaining noise.
+    depth, to 0 at four radii. Rays are evenly spread (by least energy) and cosine-weighted. Each pixel reflects them at
+    another random vector of a 64×64 noise texture. Each ray has one point within a fifth of the radius, and three up to
+    the radius, or to where the ray leaves the picture. Quads of four pixels are averaged, and a bilateral blur removes
+    the remaining noise.
 
-    By default a quarter of the pixels is computed, with three quarters more points, which after a blur over about the
-    same area leaves as much noise. The others are interpolated, or computed where that would be visible.
+    By default a quarter of the pixels is computed, with 75 % more points, so that a blur over about the same area
+    leaves as much noise. The other pixels are interpolated, or computed where interpolation would be visible.
     """
 
     noise = Internal(format="rgba16_snorm", size=(64, 64), kept=True)
@@ -30,8 +30,12 @@ class SSAOHemisphere(RefinedOcclusion):
     blurred_x = Internal(format="r16", size=reduced_size)
     blurred = Internal(format="r16", size=reduced_size)
 
-    samples: int = define(default=32, min=8, max=128, doc="Points per pixel, four per ray; rounded down to fours.")
-    animated: bool = define(default=False, doc="Sample other directions in each frame, for `accumulate` to average.")
+    samples: int = define(
+        default=32, min=8, max=128, doc="Points per pixel, four per ray; rounded down to a multiple of four."
+    )
+    animated: bool = define(
+        default=False, doc="Sample different directions in each frame, which `accumulate` averages."
+    )
     blur: int = param(
         default=4,
         unit="texels",
@@ -41,7 +45,10 @@ class SSAOHemisphere(RefinedOcclusion):
         "pixels are computed.",
     )
     contrast: float = param(
-        default=0.05, min=0, max=1, doc="With `refine`, the largest difference of reduced pixels that is interpolated."
+        default=0.05,
+        min=0,
+        max=1,
+        doc="With `refine`, the largest difference between reduced pixels that is interpolated.",
     )
     nearest: float = param(
         default=0.0,
@@ -51,7 +58,7 @@ class SSAOHemisphere(RefinedOcclusion):
     )
 
     def record(self, steps: Steps) -> None:
-        """Record surfaces, noise, sampling, the two axes of the blur and the way to full size."""
+        """Record surfaces, noise, sampling, the two axes of the blur and the upsampling."""
         size_defines = self.size_defines(steps)
         self.gather_surfaces(steps)
         steps.fullscreen("random_vectors.frag", out=self.noise)

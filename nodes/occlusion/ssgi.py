@@ -41,13 +41,15 @@ class SSGI(Interreflection):
 
     Screen-space global illumination as the counterpart of `ssao_disc`: each sample is a disc in space that emits its
     diffuse radiance, with the form factor `A cos e cos r / (π d² + A)` (Bunnell, "Dynamic Ambient Occlusion and
-    Indirect Lighting", 2005). Discs behind nearer ones of the same direction emit nothing, nor do back faces. Light
+    Indirect Lighting", 2005). Discs hidden by nearer ones in the same direction emit nothing, nor do back faces. Light
     from surfaces outside the picture is missing.
     """
 
     occlusion = DROPPED
     back_depth = Input(
-        Depth, optional=True, doc="Depth of a G-buffer of back faces, whose light is gathered too; needs the other two."
+        Depth,
+        optional=True,
+        doc="Depth of a G-buffer of back faces, whose light is gathered, too; needs the other two `back_` inputs.",
     )
     back_normal = Input(Normal, optional=True, doc="Unit normal of back faces, world space.")
     back_diffuse = Input(Radiance, optional=True, doc="Diffuse radiance that leaves back faces.")
@@ -57,7 +59,7 @@ class SSGI(Interreflection):
         optional=True,
         many=True,
         doc="Depth of pictures with other views from the same eye, which show surfaces outside this one; needs the "
-        "other two of the same views.",
+        "other two `beyond_` inputs of the same views.",
     )
     beyond_normal = Input(
         Normal, size="any", optional=True, many=True, doc="Unit normal in those pictures, world space."
@@ -116,7 +118,7 @@ class SSGI(Interreflection):
         self.reflect_indirect(steps)
 
     def pictures_beyond(self, steps: Steps) -> dict[int, dict[str, Any]]:
-        """Return the inputs of the pictures with other views, by layer; those of which all three are connected."""
+        """Return the inputs of the pictures with other views, by layer, where all three are connected."""
         by_view: dict[str, dict[str | None, Part]] = {}
         for name, port in (
             ("depth", self.beyond_depth),

@@ -27,5 +27,5 @@ class SSIL(OcclusionAndLight):
 
     def record(self, steps: Steps) -> None:
         """Record sampling, filtering and the reflection of light."""
-        # Light reaches far beyond the radius of occlusion: fewer directions, with more steps, have enough within it.
+        # Light reaches far beyond the radius of occlusion; fewer directions with more steps suffice within it.
         self.record_both(steps, "ssil.frag", {"STEPS": min(max(self.samples // 2, 4), 16)})

@@ -24,36 +24,37 @@ from rendergraph.api import Any as AnyTexel
 
 
 class SVGF(Node):
-    """Turn a path-traced picture of few samples into a smooth one, filtered by its own variance.
+    """Denoise a path-traced picture with few samples, guided by its own variance.
 
     Spatiotemporal variance-guided filtering (Schied et al. 2017). The light is divided by the albedo, so that textures
-    stay sharp. Each pixel continues the mean of the previous frame's texels that showed the same surface, and so do the
-    first two moments of its luminance, which give its variance; in the first frames those of its neighbours help. Then
-    an à-trous filter averages texels of the same surface whose luminance differs by no more than the noise explains.
+    stay sharp. Each pixel continues the mean of the previous frame's texels that showed the same surface, and the first
+    two moments of its luminance, which give its variance; in the first frames, neighbours contribute to the variance.
+    Then an à-trous filter averages texels of the same surface whose luminance differs by no more than the noise
+    explains.
 
     The variance is that of the mean, so the filter fades as the noise does: a still picture converges to the mean of
     its samples. The original feeds the first pass of the filter back into the mean, which is smoother in motion, but
     would leave a bias in still pictures. With `samples_taken` the source may itself be a mean that continues while
-    nothing changes, as that of `path_traced`; the samples of each frame are recovered from it.
+    nothing changes, such as that of `path_traced`; the samples of each frame are recovered from it.
     """
 
     radiance = Input(Radiance, doc="The noisy picture; alpha is coverage.")
     samples_taken = Input(
-        Luminance, optional=True, doc="Samples in each pixel of it. Unconnected: its frames are independent."
+        Luminance, optional=True, doc="Samples in each pixel of `radiance`. Unconnected: its frames are independent."
     )
     albedo = Input(Albedo, doc="Base colour of the surfaces.")
     depth = Input(Depth, doc="Window depth; positions come from it and its view.")
     normal = Input(Normal, doc="Unit normal, world space.")
     velocity = Input(Velocity, optional=True, doc="Motion vectors. Unconnected: only the camera moves.")
     instance = Input(
-        AnyTexel, optional=True, doc="Number of the object in each pixel. Objects in one plane then keep apart."
+        AnyTexel, optional=True, doc="Number of the object in each pixel, which keeps objects in one plane apart."
     )
     denoised = Output(Radiance, format="rgba16f", size="radiance", doc="The smooth picture; the source for background.")
     variance = Output(
         Luminance, format="r32f", size="radiance", doc="Variance of the luminance over albedo before the filter."
     )
     mean = History(format="rgba32f", doc="Mean light over albedo, and the number of the object.")
-    moments = History(format="rg32f", doc="Means of its luminance and of the square.")
+    moments = History(format="rg32f", doc="Means of its luminance and squared luminance.")
     surfaces = History(format="rgba32f", doc="Normal times the number of frames; distance.")
     source = History(format="rgba32f", doc="The source, and its number of samples.")
     view_surfaces = Internal(format="rgba32f", size="depth", view="depth")
@@ -65,12 +66,15 @@ class SVGF(Node):
     tolerance: float = param(
         default=0.02, min=1e-6, max=1, doc="How far from its plane a surface may lie, relative to its distance."
     )
-    facing: float = param(default=0.9, min=-1, max=1, doc="Least cosine between its normals in both frames.")
+    facing: float = param(default=0.9, min=-1, max=1, doc="Least cosine between a surface's normals in both frames.")
     luminance_tolerance: float = param(
-        default=4.0, min=0, max=100, doc="Difference of luminance, in standard deviations, that weighs 1/e."
+        default=4.0, min=0, max=100, doc="Difference of luminance, in standard deviations, that has a weight of 1/e."
     )
     passes: int = structural(
-        default=5, min=1, max=8, doc="Of the filter; each reaches twice as far as the one before, the first two texels."
+        default=5,
+        min=1,
+        max=8,
+        doc="Passes of the filter. The first reaches two texels, each further one twice as far.",
     )
 
     def record(self, steps: Steps) -> None:

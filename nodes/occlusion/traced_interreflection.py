@@ -9,23 +9,23 @@ from rendergraph.api import ADD, DROPPED, EnvironmentMap, Input, SceneData, Stat
 
 from ._interreflection import Interreflection
 
-_MOST_RAYS = 80  # of a pixel in one step: drivers limit how long a step takes, and llvmpipe how often its loops turn
+_MOST_RAYS = 80  # per pixel and step: drivers limit the duration of a step, and llvmpipe the iterations of its loops
 
 
 class TracedInterreflection(Interreflection):
     """Trace rays to other surfaces, and add the diffuse light that comes from them.
 
-    Each of `samples` cosine-weighted rays that meets a surface within `radius` brings the diffuse light that this
-    surface emits and reflects. What it reflects comes from the lights, of which one is chosen for each ray and has a
-    shadow ray, from the sky, by one more ray, and with more than one of the `bounces` from further surfaces. The sky is
-    the scene's environment, or the constant `sky`. Glass passes light straight on, and a coat keeps some of it. Unlike
-    the techniques of screen space it knows what lies outside the picture and behind other surfaces. `diffuse`, the
-    light in the picture, is read only with `reuse`, which takes the light of surfaces that the picture shows from
-    there, and saves their rays.
+    Each of `samples` cosine-weighted rays that hits a surface within `radius` receives the diffuse light that this
+    surface emits and reflects. The reflected light comes from the lights, one of which is chosen for each ray and
+    tested with a shadow ray; from the sky, with one more ray; and, if `bounces` is above 1, from further surfaces. The
+    sky is the scene's environment, or the constant `sky`. Glass lets light pass straight through, and a coat attenuates
+    it. Unlike screen-space techniques, this node sees surfaces outside the picture and behind other surfaces.
+    `diffuse`, the light in the picture, is read only with `reuse`: it then provides the light of surfaces that the
+    picture shows, which saves rays.
 
-    `animated` traces other rays in each frame, for a mean over frames; `denoise` filters a single one. At a reduced
-    `scale` fewer pixels are traced, and the others interpolated. It is the twin of the techniques of interreflection,
-    and takes their place with `-s gi.type=traced_interreflection`.
+    `animated` traces different rays in each frame, to be averaged over frames; `denoise` filters a single frame. At a
+    reduced `scale` fewer pixels are traced, and the others are interpolated. The node is the twin of the
+    interreflection techniques, and replaces them with `-s gi.type=traced_interreflection`.
     """
 
     twin: ClassVar[str | None] = None
@@ -42,7 +42,9 @@ class TracedInterreflection(Interreflection):
     )
 
     samples: int = define(default=16, min=1, max=1024, doc="Rays per pixel.")
-    bounces: int = define(default=1, min=1, max=16, doc="Surfaces that light visits before it reaches the picture's.")
+    bounces: int = define(
+        default=1, min=1, max=16, doc="Surfaces that light visits before it reaches those in the picture."
+    )
     radius: float = param(
         default=2.5, unit="m", min=1e-6, max=1e6, doc="Surfaces farther away than this send no light."
     )
@@ -57,26 +59,26 @@ class TracedInterreflection(Interreflection):
         default=0,
         min=0,
         max=5,
-        doc="Passes of a filter over light on the same surface; each reaches twice as far as the one before.",
+        doc="Passes of a filter over light on the same surface; each reaches twice as far as the previous one.",
     )
     reuse: bool = define(
         default=False,
-        doc="Take the light of surfaces that the picture shows from `diffuse`, as it is there.",
+        doc="Take the light of surfaces that the picture shows from `diffuse`, instead of tracing it.",
     )
-    animated: bool = define(default=True, doc="Trace other rays in each frame, for a mean over frames.")
+    animated: bool = define(default=True, doc="Trace different rays in each frame, to be averaged over frames.")
 
     def record(self, steps: Steps) -> None:
-        """Record the rays, the filter, the way to full size, and the reflection of light."""
+        """Record the rays, the filter, the upsampling, and the reflection of light."""
         self.trace_and_filter(steps, {"indirect": self.indirect})
         self.reflect_indirect(steps)
 
     def trace_and_filter(self, steps: Steps, out: dict[str, Any], defines: Mapping[str, int] | None = None) -> None:
-        """Record the rays in several steps, the filter and the way to full size.
+        """Record the rays in several steps, the filter and the upsampling.
 
         Args:
             steps: the recorder.
             out: the node's outputs by their names in `outputs.glsl`.
-            defines: macros of the rays.
+            defines: macros of the steps that trace rays.
         """
         reduced, screen_size = self.size_defines(steps), self.screen_size(steps)
         macros: dict[str, int] = {**reduced, "HAS_VECTOR": 1}

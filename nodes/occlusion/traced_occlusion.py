@@ -8,19 +8,19 @@ from rendergraph.api import ADD, Input, Internal, Normal, Output, SceneData, Sta
 
 from ._screen_space import ScreenSpaceOcclusion, reduced_size
 
-_MOST_RAYS = 128  # of a pixel in one step: drivers limit how long a step takes, and llvmpipe how often its loops turn
+_MOST_RAYS = 128  # per pixel and step: drivers limit the duration of a step, and llvmpipe the iterations of its loops
 
 
 class TracedOcclusion(ScreenSpaceOcclusion):
     """Trace rays into the hemisphere: exact ambient occlusion.
 
-    Visibility is the part of `samples` cosine-weighted rays that reach `radius` without meeting a surface (Zhukov,
-    Iones and Kronin, "An Ambient Light Illumination Model", 1998). Unlike the techniques of screen space it knows what
-    lies outside the picture and behind other surfaces. The result is not filtered: `animated` traces other rays in each
-    frame, whose mean `accumulate` takes, and `denoise` smooths a single frame. At a reduced `scale` fewer pixels are
-    traced, and the others interpolated.
+    Visibility is the fraction of `samples` cosine-weighted rays that reach `radius` without hitting a surface (Zhukov,
+    Iones and Kronin, "An Ambient Light Illumination Model", 1998). Unlike screen-space techniques, this node sees
+    surfaces outside the picture and behind other surfaces. The result is not filtered: `animated` traces different rays
+    in each frame, which `accumulate` averages, and `denoise` smooths a single frame. At a reduced `scale` fewer pixels
+    are traced, and the others are interpolated.
 
-    It is the twin of the occlusion techniques, and takes their place with `-s ao.type=traced_occlusion`.
+    The node is the twin of the occlusion techniques, and replaces them with `-s ao.type=traced_occlusion`.
     """
 
     scene = Input(SceneData, rays=True, doc="The scene.")
@@ -31,13 +31,13 @@ class TracedOcclusion(ScreenSpaceOcclusion):
         doc="Unit vector, the mean unoccluded direction, world space; 0 for background.",
     )
     unfiltered_vector = Internal(format="rgba16f", size=reduced_size)
-    rays = Internal(format="rgba32f", size=reduced_size, doc="Sum over the steps that many rays take.")
+    rays = Internal(format="rgba32f", size=reduced_size, doc="Sum over steps, if the rays need several.")
 
     samples: int = define(default=16, min=1, max=1024, doc="Rays per pixel.")
-    animated: bool = define(default=True, doc="Trace other rays in each frame, for a mean over frames.")
+    animated: bool = define(default=True, doc="Trace different rays in each frame, to be averaged over frames.")
 
     def record(self, steps: Steps) -> None:
-        """Record the rays, and the way to full size."""
+        """Record the rays and the upsampling."""
         out: dict[str, Any] = {port.name: port for port in (self.occlusion, self.bent_normal) if steps.used(port)}
         reduced = self.size_defines(steps)
         macros = {**reduced, **({"HAS_VECTOR": 1} if self.bent_normal.name in out else {})}

@@ -33,7 +33,7 @@ from ..lighting._lighting import has_layer
 Color = float | tuple[float, float, float]
 _TABLE = 512, 256  # directions of the environment to choose from
 _BATCH = 4  # paths whose random numbers depend on each other, so that they cover a pixel evenly
-_MOST_RAYS = 80  # of a pixel in one step: drivers limit how long a step takes, and llvmpipe how often its loops turn
+_MOST_RAYS = 80  # per pixel and step: drivers limit the duration of a step, and llvmpipe the iterations of its loops
 
 
 def _emitters(facts: Facts) -> int:
@@ -54,17 +54,17 @@ def _tree_size(width: int, height: int) -> tuple[int, int]:
 
 
 class PathTraced(Node):
-    """Light the scene by following the paths of light: the truth that other techniques approximate.
+    """Light the scene by path tracing: the reference that other techniques approximate.
 
-    It takes the place of a lighting node, and needs neither shadows nor occlusion nor interreflection: all of it
-    follows from rays. Its shading models, materials and lights are those of the other nodes. Each frame adds `samples`
-    paths to every pixel, for as long as neither the camera nor the scene nor a parameter changes, and `radiance` is the
-    mean of all of them. Its noise falls with the square root of their number; `variance` says how large it is.
+    It replaces a lighting node, and needs no shadow, occlusion or interreflection nodes, because rays account for all
+    of these. Its shading models, materials and lights are those of the other nodes. Each frame adds `samples` paths to
+    every pixel, as long as the camera, the scene and all parameters stay the same, and `radiance` is the mean of all
+    paths. Its noise falls with the square root of their number; `variance` estimates it.
 
-    Surfaces that emit light and the environment are sources like any other. Without an environment, light of the
-    constant radiance `ambient` comes from all sides. The camera does not see backs of materials with one side, as in
-    other nodes; for all other rays they are as their fronts, but emit no light. A shading model without sampled
-    directions of its own is sampled by the cosine, which finds narrow highlights late.
+    Emissive surfaces and the environment are light sources like any other. Without an environment, light of the
+    constant radiance `ambient` comes from all sides. As in other nodes, the camera does not see back faces of one-sided
+    materials; to all other rays they look like front faces, but emit no light. A shading model that does not sample
+    directions itself is sampled by the cosine, which is slow to converge for narrow highlights.
 
     References: Kajiya 1986; Veach 1997 (multiple importance sampling); Heitz 2018 (visible normals); Burley 2020 (Owen
     scrambling by hashes).
@@ -81,10 +81,15 @@ class PathTraced(Node):
     variance = Output(Radiance, format="rgba32f", doc="Variance of this mean, of each channel.")
     samples_taken = Output(Luminance, format="r32f", doc="Number of paths in the mean.")
     albedo = Output(Albedo, format="rgba16f", clear=0.0, doc="Base colour of the first surface at the pixel's centre.")
-    normal = Output(Normal, format="rgba16_snorm", clear=0.0, doc="Its shading normal; 0 on the background.")
-    depth = Output(Depth, format="depth32f", clear=0.0, doc="Its window depth, 0 on the background.")
+    normal = Output(
+        Normal, format="rgba16_snorm", clear=0.0, doc="Shading normal of that surface; 0 on the background."
+    )
+    depth = Output(Depth, format="depth32f", clear=0.0, doc="Window depth of that surface, 0 on the background.")
     instance = Output(
-        AnyTexel, format="r32f", clear=0.0, doc="Number of its object in the scene, from 1; 0 on the background."
+        AnyTexel,
+        format="r32f",
+        clear=0.0,
+        doc="Number of that surface's object in the scene, from 1; 0 on the background.",
     )
     mean = History(format="rgba32f")
     spread = History(format="rgba32f")
@@ -96,13 +101,13 @@ class PathTraced(Node):
         AnyTexel, format="r32f", size=_TABLE, mips=0, doc="Luminance of directions times their solid angle."
     )
     environment_tree = Internal(
-        AnyTexel, format="rgba32f", size=lambda node, facts: _tree_size(*_TABLE), doc="Tree to choose directions by."
+        AnyTexel, format="rgba32f", size=lambda node, facts: _tree_size(*_TABLE), doc="Tree for choosing directions."
     )
     emitter_tree = Internal(
         AnyTexel,
         format="rgba32f",
         size=lambda node, facts: _tree_size(*(_table_side(node, facts),) * 2),
-        doc="Tree to choose emitting triangles by.",
+        doc="Tree for choosing emitting triangles.",
     )
     emitter_table = Internal(
         AnyTexel,
@@ -118,11 +123,11 @@ class PathTraced(Node):
         kept=True,
         doc="Split-sum BRDF factors, for a shared diffuse lobe and for sheen.",
     )
-    first_depth = Internal(Depth, format="depth32f", clear=0.0, doc="The depth if nobody reads it.")
+    first_depth = Internal(Depth, format="depth32f", clear=0.0, doc="The depth target if `depth` is not used.")
 
     shading: Literal["unlit", "phong", "blinn_phong", "anisotropic", "pbr"] | str = define(
         default="pbr",
-        doc="Shading model: Cook-Torrance (`pbr`), always with its anisotropic formulas, or an empirical model.",
+        doc="Shading model: Cook-Torrance (`pbr`), its anisotropic form for all surfaces, or an empirical model.",
         choices="shading",
         needs=("nothing", "phong", "grain", "grain_where_any"),
     )
@@ -131,7 +136,7 @@ class PathTraced(Node):
     )
     diffuse_lobe: Literal["lambert", "shared"] = define(
         default="lambert",
-        doc="Diffuse lobe of `pbr`: of all the light, or of the share that the specular lobe does not reflect.",
+        doc="Diffuse lobe of `pbr`: reflects all light, or only the share that the specular lobe does not reflect.",
     )
     terms: Literal["all", "diffuse", "specular"] = define(
         default="all", doc="Reflect light by all lobes of the materials, or by one kind alone."
@@ -148,32 +153,32 @@ class PathTraced(Node):
         default=True, doc="Show the environment behind all surfaces; otherwise there is the `background`."
     )
     transparent: bool = structural(
-        default=False, doc="Leave out what is behind all surfaces, and let alpha say how much they cover."
+        default=False, doc="Leave out the background, and write the coverage of surfaces to alpha."
     )
-    samples: int = structural(default=16, min=1, max=65536, unit="paths", doc="Paths of a pixel in each frame.")
+    samples: int = structural(default=16, min=1, max=65536, unit="paths", doc="Paths per pixel in each frame.")
     max_bounces: int = define(
         default=4,
         min=0,
         max=64,
-        doc="Most reflections between the first and the last surface of a path; 0: direct light.",
+        doc="Maximum number of reflections between the first and the last surface of a path; 0: direct light.",
     )
     light_part: Literal["all", "direct", "one_bounce", "indirect"] = define(
         default="all",
-        doc="Show a part: `direct` is what is emitted or reflected once, `one_bounce` comes by way of one other "
-        "surface, `indirect` is all but direct light.",
+        doc="Show a part: `direct` is emitted or reflected once, `one_bounce` arrives by way of one other surface, "
+        "`indirect` is all light that is not direct.",
     )
     sources: Literal["all", "lights", "environment", "emissive"] = define(
         default="all", doc="Sources of light: punctual lights, the environment or `ambient`, emissive surfaces."
     )
     antialiasing: bool = define(
-        default=True, doc="Spread paths over the pixel. Without it all begin at its centre, as in other nodes."
+        default=True, doc="Spread paths over the pixel; otherwise all begin at its centre, as in other nodes."
     )
     seed: int = param(
-        default=0, min=0, doc="Of the random numbers. Pictures with different seeds have independent noise."
+        default=0, min=0, doc="Seed of the random numbers. Pictures with different seeds have independent noise."
     )
 
     def record(self, steps: Steps) -> None:
-        """Record the tables to choose light from, the paths in several steps, and what follows from them."""
+        """Record the tables for choosing light, the paths in several steps, and the outputs that follow from them."""
         used: dict[str, Port] = {name: port for name, port in self.outputs().items() if steps.used(port)}
         means = {name: port for name, port in used.items() if name in ("radiance", "variance", "samples_taken")}
         if means:
@@ -224,7 +229,7 @@ class PathTraced(Node):
             )
             self._add_tree(steps, self.emitter_table, self.emitter_tree, 3)
         if emits or self.sources in ("all", "environment"):
-            defines["FOLLOWS_LAST"] = 1  # a ray from the last surface may find light by itself
+            defines["FOLLOWS_LAST"] = 1  # a ray from the last surface may hit light sources
         at_once = max(batch, _MOST_RAYS // (self.max_bounces + 1) // batch * batch)
         before: tuple[Port | Part, Port | Part] = self.mean.previous, self.spread.previous
         between = [(self.mean_between, self.spread_between), (self.mean_before, self.spread_before)]
@@ -249,7 +254,7 @@ class PathTraced(Node):
         )
 
     def _add_tree(self, steps: Steps, table: Internal, tree: Internal, channel: int) -> None:
-        """Record the mips of a table, and the tree that texels are chosen by."""
+        """Record the mips of a table, and the tree by which texels are chosen."""
         if steps.desc(table).mips > 1:
             steps.mipmaps(table)
         steps.fullscreen(

@@ -35,13 +35,13 @@ def split_distances(near: float, far: float, count: int, weight: float) -> list[
 
 
 def overlapping_spans(distances: Sequence[float], blend: float) -> list[tuple[float, float]]:
-    """Return the span of distances of each cascade, which begins in the last `blend` of the previous one."""
+    """Return each cascade's span of distances; it begins in the last fraction `blend` of the previous cascade."""
     begins = [0.0] + [b - blend * (b - a) for a, b in pairwise(distances[:-1])]
     return list(zip(begins, [*distances[1:-1], math.inf], strict=True))
 
 
 def farthest_visible(camera: ViewMatrices, box: Points) -> float:
-    """Return the largest distance along its axis at which a camera sees a box, in metres, rounded up to a few values.
+    """Return the largest distance along a camera's axis at which it sees a box, in metres, rounded up in coarse steps.
 
     Without rounding, every movement of the camera would change all splits, and with them every texel of the maps.
     """
@@ -52,9 +52,9 @@ def farthest_visible(camera: ViewMatrices, box: Points) -> float:
 
 
 def bounding_sphere(camera: ViewMatrices, begin: float, end: float) -> tuple[Points, float]:
-    """Return centre and radius of a sphere around the part of a camera's frustum between two distances.
+    """Return the centre and radius of a sphere around the part of a camera's frustum between two distances.
 
-    The radius depends only on the projection: it does not change in any bit when the camera moves or rotates.
+    The radius depends only on the projection: it stays bit-identical when the camera moves or rotates.
     """
     corners = projection.frustum_corners(replace(camera, view=np.eye(4)), begin, end)
     first, last = corners[:4].mean(axis=0), corners[4:].mean(axis=0)
@@ -71,10 +71,10 @@ def bounding_sphere(camera: ViewMatrices, begin: float, end: float) -> tuple[Poi
 def cascade_view(
     direction: Sequence[float], sphere: tuple[Points, float], box: Points, casting: Points, resolution: int
 ) -> ViewMatrices:
-    """Return a directional light's view around a sphere, whose texels do not move when the sphere moves.
+    """Return a directional light's view around a sphere; its texels stay in place when the sphere moves.
 
-    Its size depends only on the sphere's radius, and it moves by whole texels. If the casters span less than that, the
-    view covers the casters, and does not move at all.
+    Its size depends only on the sphere's radius, and it moves by whole texels. If the casters span less than this size,
+    the view covers the casters and does not move at all.
 
     Args:
         direction: direction of the light.

@@ -10,8 +10,8 @@ class Casting(Node):
 
     light: str | tuple[str, ...] = structural(
         default="auto",
-        doc="Lights that cast: names, or `all` or `auto` (the first directional, else spot, else point light) of "
-        "those without `casts_shadow: false`.",
+        doc="Lights that cast shadows: names, or `all` or `auto` (the first directional, else spot, else point light) "
+        "of those without `casts_shadow: false`.",
     )
 
     def lights(self, facts: Facts) -> tuple[int, ...]:

@@ -13,7 +13,7 @@ BANDS = 4
 
 
 def band_size(node: Node, facts: Facts) -> tuple[int, int]:
-    """Return width and height of a band of the connected shadow map."""
+    """Return the width and height of a band of the connected shadow map."""
     desc = facts.input("shadow_map").desc if facts.connected("shadow_map") else None
     return (desc.width, -(-desc.height // BANDS)) if desc is not None else (1, 1)
 
@@ -72,7 +72,7 @@ class FilteredMap(MapTechnique):
         return 1
 
     def record(self, steps: Steps) -> None:
-        """Record the filter of columns, then rows, for each band and layer; all share the intermediate textures."""
+        """Record the column filter, then the row filter, for each band and layer, with shared intermediate textures."""
         coverage, band = steps.desc(self.coverage), steps.desc(self.coverage_columns)
         for layer in range(coverage.layers):
             for first in range(0, self.layers_per_map_layer(), self.layers_per_step):

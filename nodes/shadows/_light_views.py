@@ -35,7 +35,7 @@ def layer_lights(names: str | Sequence[str], lights: Sequence[Any], layers: Call
     return tuple(index for index in casting_lights(names, lights) for _ in range(layers(lights[index].type)))
 
 
-# --- one kind each ---------------------------------------------------------------------------------------------------
+# --- views by type of light -------------------------------------------------------------------------------------------
 
 
 def light_views(light: Any, scene: Any, camera: ViewMatrices, resolution: int) -> Sequence[ViewMatrices]:
@@ -57,9 +57,9 @@ def light_views(light: Any, scene: Any, camera: ViewMatrices, resolution: int) -
 
 
 def receiving_box(scene: Any, light: Any) -> Points:
-    """Return the box around all surfaces and around their shadows on shadow catchers, which are no part of `bounds`.
+    """Return the box around all surfaces and around their shadows on shadow catchers, which `bounds` does not include.
 
-    The corners of the scene's bounds are moved along the light down to the lowest catcher, and not beyond catchers.
+    The corners of the scene's bounds are moved along the light to the lowest catcher, but not past the catchers' edges.
     """
     box = np.asarray(scene.bounds, np.float64)
     if not len(scene.catchers):
@@ -173,7 +173,7 @@ def distance_range(light: Any, box: Points) -> tuple[float, float]:
 
 
 def _map_up_vector(direction: Sequence[float] | Matrix, camera: ViewMatrices) -> Matrix:
-    """Return the map's up vector: the camera's direction, or a fixed one if it is about the light's."""
+    """Return the map's up vector: the camera's direction, or a fixed one if it is nearly parallel to the light's."""
     forward = np.asarray(direction, np.float64) / np.linalg.norm(direction)
     view_forward = -camera.view[2, :3]
     projected = view_forward - forward * (view_forward @ forward)
@@ -190,8 +190,8 @@ _MAX_FLAT_OBJECTS = 16  # flat objects that are tested: floors and walls are few
 def casting_points(scene: Any, direction: Sequence[float], position: Sequence[float] | None = None) -> Points:
     """Return the corners of the bounding boxes of all effective casters, eight per box, shape (n, 3).
 
-    A flat object with nothing behind its plane casts no visible shadow. Without the floor on which everything stands,
-    the map need not cover all of it.
+    A flat object with nothing behind its plane casts no visible shadow. If the floor under all objects is left out, the
+    map need not cover all of it.
 
     Args:
         scene: the scene's `corners`, `shown` and `casting` in this frame.
@@ -234,7 +234,7 @@ def _large_flat(scene: Any) -> npt.NDArray[np.int64]:
 
 
 def _spanning(corners: Points) -> list[int]:
-    """Return three corners of a flat box that span its plane."""
+    """Return the indices of three corners of a flat box that span its plane."""
     edges = [int(np.argmax(np.linalg.norm(corners - corners[0], axis=1)))]
     areas = np.cross(corners - corners[0], corners[edges[0]] - corners[0])
     return [0, edges[0], int(np.argmax(np.linalg.norm(areas, axis=1)))]

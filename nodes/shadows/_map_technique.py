@@ -21,9 +21,9 @@ def map_layers(node: Node, facts: Facts) -> int:
 class MapTechnique(Node):
     """Base of the shadow-map techniques.
 
-    A technique declares `lookup`, a `Function` with its own include and what that reads. The include defines
-    `map_visibility` and `MAP_HALF_WIDTH` and ends with `#include "map_shadow.glsl"`, which defines `shadow()`. Its
-    `record` first records steps that prepare internal textures, then calls `super().record(steps)`.
+    A technique declares `lookup`, a `Function` with its own include and the ports that the include reads. The include
+    defines `map_visibility` and `MAP_HALF_WIDTH` and ends with `#include "map_shadow.glsl"`, which defines `shadow()`.
+    Its `record` first records steps that prepare internal textures, then calls `super().record(steps)`.
     """
 
     twin = "traced_shadows"

@@ -1,4 +1,4 @@
-"""Silhouettes of meshes from lights, on the CPU. The edges of a mesh are found once and classified in every frame."""
+"""Silhouettes of meshes seen from lights, on the CPU. A mesh's edges are found once and classified in every frame."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class Silhouette:
     """The silhouette edges and lit faces of one object in world space, from which its shadow volume is extruded.
 
     Attributes:
-        sides: ends of each edge between a lit and an unlit face, shape (s, 2, 3), ordered so that the quad (first, its
-            extrusion, second, its extrusion) as a strip faces outwards.
+        sides: ends of each edge between a lit and an unlit face, shape (s, 2, 3), ordered so that the triangle strip
+            (first, its extrusion, second, its extrusion) faces outwards.
         lit: corners of the faces that face the light, counter-clockwise from outside, shape (t, 3, 3).
     """
 
@@ -35,7 +35,7 @@ def silhouette(mesh: Any, transform: Points, light: Points, pose: Any = None) ->
         mesh: a mesh with `positions` and `edges`.
         transform: object-to-world matrix, shape (4, 4).
         light: homogeneous world-space position of the light, (x, y, z, 1), or (x, y, z, 0) towards it.
-        pose: of an animated mesh; its edges are those of the bind pose, where vertices at one place are one.
+        pose: pose of an animated mesh; its edges are those of the bind pose, in which coincident vertices are merged.
     """
     edges, positions = mesh.edges, (mesh.positions if pose is None else pose.vertices()["positions"]).astype(np.float64)
     facing = (planes(mesh) if pose is None else _planes(positions, edges.triangles)) @ (

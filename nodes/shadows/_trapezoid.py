@@ -13,13 +13,13 @@ Matrix = npt.NDArray[np.float64]
 Points = npt.NDArray[np.float64]
 
 FOCUS_SHARE = 0.8
-"""Fraction of the map for the range in focus."""
+"""Fraction of the map that the range in focus takes."""
 
 _SQUARE = np.array([[1.0, 0, 0, 1], [-1, 0, 0, 1], [0, 1, 0, 1], [0, -1, 0, 1]])  # planes of the square from -1 to 1
 
 
 def apex_distance(length: float, focus: float, share: float = FOCUS_SHARE) -> float:
-    """Return how far in front of a trapezoid its sides meet, so that the first `focus` of its `length` fills a share.
+    """Return how far in front of a trapezoid its sides must meet for the first `focus` of its `length` to fill a share.
 
     It is infinite if a rectangle does so already, or if the sides would have to diverge (Martin and Tan, "Anti-aliasing
     and Continuity with Trapezoidal Shadow Maps", 2004; their 80 % line is -0.6 in a picture from 1 to -1).
@@ -33,7 +33,7 @@ def trapezoid_to_square(trapezoid: Points) -> Matrix:
     """Return the projective transform of a trapezoid's corners to (-1, -1), (1, -1), (1, 1), (-1, 1), shape (3, 3).
 
     Args:
-        trapezoid: (4, 2), the base first, counter-clockwise.
+        trapezoid: corners, shape (4, 2), the base first, counter-clockwise.
     """
     rows, right = [], []
     for (x, y), (u, v) in zip(trapezoid, ((-1, -1), (1, -1), (1, 1), (-1, 1)), strict=True):
@@ -51,7 +51,7 @@ def trapezoid_around(points: Points, start: Points, ahead: Points, focus: float)
         focus: fraction of its length, from the eye, that is in focus.
 
     Returns:
-        The corners, from the base farthest from the eye, counter-clockwise; None if a rectangle does as well.
+        The corners, counter-clockwise from the base farthest from the eye; None if a rectangle is as good.
     """
     ahead = ahead / np.linalg.norm(ahead)
     side = np.array([ahead[1], -ahead[0]])  # to the right

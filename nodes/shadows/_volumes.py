@@ -58,7 +58,7 @@ class HasVolumes(Casting):
         doc="Length of the extrusion; 0 extrudes to infinity.",
     )
     unclosed: Literal["refuse", "skip"] = structural(
-        default="refuse", doc="Casters with open meshes are an error, or are skipped."
+        default="refuse", doc="Whether casters with open meshes are an error or are skipped."
     )
 
     def casters(self, facts: Facts) -> tuple[ObjectFacts, ...]:
@@ -72,7 +72,7 @@ class HasVolumes(Casting):
             return tuple(one for one in casters if one.closed)
         for one in casters:
             if not one.closed:
-                raise SceneError(f"{one.gap}; `casts_shadow: false` or `unclosed: skip` leaves it out", one.name)
+                raise SceneError(f"{one.gap}; set `casts_shadow: false` or `unclosed: skip` to leave it out", one.name)
         return casters
 
     def draw_volumes(self, steps: Steps, layer: int, method: int, geometry: str, **options: Any) -> None:
@@ -90,11 +90,11 @@ class HasVolumes(Casting):
         )
 
     def counting_method(self, touches: npt.NDArray[np.bool_]) -> npt.NDArray[np.int32]:
-        """Return the counting method per object, from whether it may touch the near-plane pyramid."""
+        """Return the counting method per object, given whether it may touch the near-plane pyramid."""
         return np.full(len(touches), Z_FAIL, np.int32)
 
     def counting_methods(self, frame: Frame) -> tuple[list[Any], npt.NDArray[np.int32]]:
-        """Return the lights, and for each of them the counting method per object; 0 if the light cannot reach it."""
+        """Return the lights, and for each the counting method per object; 0 if the light cannot reach the object."""
         scene = frame.scene
         lights = [scene.lights[index] for index in casting_lights(self.light, scene.lights)]
         centers, radii = bounding_spheres(scene)
@@ -136,7 +136,7 @@ class CountsVolumes(HasVolumes):
     depth_clamp: bool = structural(default=True, doc="Clamp depth, so that a finite far plane does not clip volumes.")
 
     def max_triangles(self, facts: Facts) -> int:
-        """Return an upper bound of the triangles in silhouettes."""
+        """Return an upper bound on the number of triangles in silhouettes."""
         return max(1, len(self.lights(facts)) * sum(one.triangles for one in self.casters(facts)))
 
     def count(self, steps: Steps, layer: int, stencil: Port, view: Port | None = None) -> None:
@@ -176,7 +176,7 @@ class CountsVolumes(HasVolumes):
             steps.draw(None, vertex="silhouette_caps.vert", faces=self.faces, command=command + 1, **options)
 
     def counting_method(self, touches: npt.NDArray[np.bool_]) -> npt.NDArray[np.int32]:
-        """Return the counting method per object, from whether it may touch the near-plane pyramid."""
+        """Return the counting method per object, given whether it may touch the near-plane pyramid."""
         return np.where(touches if self.method == "auto" else self.method == "zfail", Z_FAIL, Z_PASS)
 
     def update(self, frame: Frame) -> None:

@@ -19,7 +19,7 @@ class ShadowCascaded(ShadowMapNode):
     The visible depth range is split (Zhang, Sun, Xu and Lun 2006), and each cascade has its own layer, so texels are
     fine near the eye and just sufficient at the horizon. All techniques that take a `shadow_map` work with this one.
     The layer is selected by the distance from the camera, and adjacent cascades are blended. Texels are stable in world
-    space while the camera moves: a layer has the size of the bounding sphere of its cascade, whatever the camera's
+    space while the camera moves: a layer has the size of the bounding sphere of its cascade, regardless of the camera's
     orientation, and moves by whole texels (Valient, "Stable Rendering of Cascaded Shadow Maps", 2008). Spot and point
     lights have the same layers as in `shadow_map`.
     """
@@ -32,7 +32,7 @@ class ShadowCascaded(ShadowMapNode):
         default=0.1, min=0, max=0.5, doc="Fraction of each cascade over which it is blended with the next."
     )
     reach: float = param(
-        default=0.0, unit="m", min=0, doc="Distance that the cascades reach from the eye; 0 reaches everything visible."
+        default=0.0, unit="m", min=0, doc="Distance from the eye that the cascades cover; 0 covers everything visible."
     )
 
     def layers(self, kind: str) -> int:
@@ -40,7 +40,7 @@ class ShadowCascaded(ShadowMapNode):
         return self.cascades if kind == "directional" else super().layers(kind)
 
     def light_views(self, light: Any, frame: Frame) -> Sequence[ViewMatrices]:
-        """Return the views of one light: of a directional light one per cascade."""
+        """Return the views of one light; a directional light has one per cascade."""
         if light.type != "directional":
             return super().light_views(light, frame)
         camera, box = self.eye(frame), receiving_box(frame.scene, light)

@@ -13,9 +13,9 @@ class ShadowConvolution(FilteredMap):
     """Approximate the depth test by a Fourier series, filtered term by term (Annen, Mertens, Bekaert et al. 2007).
 
     Each term is the product of a factor of the map's depth and one of the receiver's depth, so the map's factors can be
-    filtered before the lookup. Unlike an exponential they are bounded. With few terms the step is not steep: light
-    leaks over about 1 / (2 `terms`) of the range of the light's view behind a caster, with ringing beyond. Two terms
-    share a texture of four channels.
+    filtered before the lookup. Unlike exponentials, these factors are bounded. With few terms the step is not steep:
+    behind a caster, light leaks over about 1 / (2 `terms`) of the depth range of the light's view, with ringing beyond.
+    Two terms share a four-channel texture.
     """
 
     vertical_shader: ClassVar[str] = "shadow_convolution_vertical.frag"

@@ -8,7 +8,7 @@ from .shadow_map import ShadowMapNode
 
 
 class ShadowCube(ShadowMapNode):
-    """Render depth from lights into all layers in one pass, for point lights with their six layers.
+    """Render depth from lights into all layers in one pass; a point light has six layers.
 
     A geometry shader projects each triangle into every view and emits it to the layers that it may intersect, so
     vertices are fetched and transformed once instead of six times. The map equals that of `shadow_map`.

@@ -12,8 +12,8 @@ _DARKEN = Blend("zero", "one_minus_src_alpha", "zero", "one")
 class ShadowDarkening(CountsVolumes):
     """Darken a lit picture inside shadow volumes, with one full-screen quad per light.
 
-    Lighting does not need to know about shadows, so this is simple and fast. It is not correct, because it darkens all
-    light alike, including highlights of other lights and surfaces that face away from the light.
+    Lighting does not need to know about shadows, so this is simple and fast. It is not correct: it darkens all light
+    alike, including highlights of other lights, and also surfaces that face away from the light.
     """
 
     depth = Input(Depth, doc="Depth of the opaque surfaces, from the pipeline's camera.")

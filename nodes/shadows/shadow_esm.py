@@ -16,7 +16,7 @@ class ShadowESM(FilteredMap):
     of a receiver at t. This is the product of a factor of the map and one of the receiver, so the map's factor can be
     filtered once per frame, in a single channel. Its logarithm is stored (Salvi 2008), so that neither range nor
     exponent is limited. Light leaks up to about 3 / `exponent` metres behind a caster. Where the filter region contains
-    surfaces farther away than the receiver, the shadow's edge recedes, the more the larger the exponent.
+    surfaces farther away than the receiver, the shadow's edge recedes, and it recedes more with a larger exponent.
     """
 
     vertical_shader: ClassVar[str] = "shadow_esm_vertical.frag"

@@ -26,7 +26,7 @@ class ShadowMSM(FilteredMap):
         default=1e-6,
         min=1e-7,
         max=0.1,
-        doc="How far the moments are moved towards those of a uniform distribution, against rounding errors.",
+        doc="How far the moments are moved towards those of a uniform distribution, to counter rounding errors.",
     )
     light_bleeding: float = param(
         default=0.02,

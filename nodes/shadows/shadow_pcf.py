@@ -21,7 +21,8 @@ class ShadowPCF(MapTechnique):
     """Filter the results of depth tests: percentage-closer filtering.
 
     The visibility is the mean of N×N depth tests one texel apart, each weighted bilinearly (Reeves, Salesin and Cook
-    1987). Penumbrae are about N texels wide, whatever the distance of the caster. With one tap it is a hard shadow.
+    1987). Penumbrae are about N texels wide, regardless of the distance of the caster. With one tap it is a hard
+    shadow.
 
     `kernel` sets the weights or the positions of the tests: equal weights; weights that decrease towards the border,
     which hides the square shape; a Poisson disc; or the disc rotated by a different angle per pixel, which turns

@@ -43,9 +43,9 @@ def planar_projection(plane: Floats, light: Floats) -> Floats:
 class ShadowPlanar(Casting):
     """Project the casters along the light's rays onto one plane, and draw them there as its shadow.
 
-    The shadows are exact for all meshes, including open ones and those with alpha masks. Only the receiver has shadows.
-    Its pixels are marked in the stencil first, so that shadows end at its border. Overlapping casters do not darken
-    twice.
+    The shadows are exact for all meshes, including open ones and those with alpha masks. Only the receiver shows
+    shadows. Its pixels are marked in the stencil first, so that shadows end at its border. Overlapping casters do not
+    darken twice.
     """
 
     twin = "traced_shadows"

@@ -17,10 +17,11 @@ _MARGIN = 8.0  # texels around the visible part, as for other maps
 class ShadowTrapezoidal(ShadowMapNode):
     """Render depth from lights with more texels near the camera (Martin and Tan 2004).
 
-    From a light, the camera's view frustum is about a trapezoid, narrow near the eye and wide far away. A projective
-    transform maps it to the whole texture, so that the part near the eye, `focus`, takes four fifths of the texels. The
-    trapezoid changes smoothly with the camera, and so do shadow edges, which are not stable as those of cascades. If
-    the light shines along the view direction, or the camera sees behind a spot light, the view is that of `shadow_map`.
+    Seen from a light, the camera's view frustum is roughly a trapezoid, narrow near the eye and wide far away. A
+    projective transform maps it to the whole texture, so that the part near the eye, `focus`, takes four fifths of the
+    texels. The trapezoid and the shadow edges change smoothly with the camera; unlike with cascades, the edges are not
+    stable. If the light shines along the view direction, or the camera sees behind a spot light, the view is that of
+    `shadow_map`.
     """
 
     focus: float = param(

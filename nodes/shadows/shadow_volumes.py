@@ -23,7 +23,7 @@ class ShadowVolumes(CountsVolumes):
 
     def record(self, steps: Steps) -> None:
         """Record the volumes and the visibility of each light, which also clears the stencil for the next."""
-        # A copy, because other steps may read the depth, and it has no stencil.
+        # A copy, because other steps may read the depth, which has no stencil.
         steps.fullscreen("<copy_depth.frag>", out=self.marks, depth=self.depth)
         for layer in range(len(self.lights(steps.facts))):
             self.count(steps, layer, self.marks, self.depth)

@@ -28,7 +28,7 @@ from rendergraph.api import Any as AnyTexel
 
 from ._casting import Casting
 
-_MOST_RAYS = 128  # of a pixel in one step: drivers limit how long a step takes, and llvmpipe how often its loops turn
+_MOST_RAYS = 128  # per pixel and step: drivers limit the duration of a step, and llvmpipe the iterations of its loops
 
 
 def _light_texels(node: Any, facts: Facts) -> tuple[int, int]:
@@ -36,21 +36,25 @@ def _light_texels(node: Any, facts: Facts) -> tuple[int, int]:
 
 
 class TracedShadows(Casting):
-    """Trace rays to the lights: exact shadows of everything that casts some.
+    """Trace rays to the lights: exact shadows of all casters.
 
-    A light without a size has one ray for each pixel, and hard shadows. A light with a size is a disc that faces the
-    point, of the diameter `size` for point and spot lights and of the angular diameter `angle` for directional ones;
-    visibility is the mean over `samples` rays to points of it. What shadow maps miss is in it: thin gaps, contact, any
-    number of lights, casters outside the picture, alpha masks. Rays see the scene as it is uploaded, so vertices that a
-    shader of a plugin moves cast the shadow of where they were.
+    A light without a size takes one ray per pixel and casts hard shadows. A light with a size is a disc that faces the
+    point, with diameter `size` for point and spot lights and angular diameter `angle` for directional ones; visibility
+    is the mean over `samples` rays to points on the disc. It includes what shadow maps miss: thin gaps, contact
+    shadows, any number of lights, casters outside the picture, alpha masks. Rays see the scene as uploaded, so vertices
+    that a plugin's shader moves cast shadows from their original positions.
 
-    It is the twin of all shadow-map techniques, and takes their place with `-s shadows.type=traced_shadows`. The lights
-    of a connected shadow map are the ones that it traces; the map itself is not drawn.
+    It is the twin of all shadow-map techniques and replaces them with `-s shadows.type=traced_shadows`. If a shadow map
+    is connected, it only selects the lights; the map itself is not rendered.
     """
 
     scene = Input(SceneData, rays=True, doc="The scene.")
     shadow_map = Input(
-        ShadowMap, kind="texture2d_array", size="any", optional=True, doc="Tells the lights, and is not drawn."
+        ShadowMap,
+        kind="texture2d_array",
+        size="any",
+        optional=True,
+        doc="Selects the lights; the map itself is not rendered.",
     )
     depth = Input(Depth, optional=True, doc="Depth of the picture, for `visibility`.")
     casters = Internal(AnyTexel, format="r8", size=_light_texels, kept=True)
@@ -69,8 +73,8 @@ class TracedShadows(Casting):
 
     light: str | tuple[str, ...] = structural(
         default="all",
-        doc="Lights that cast, unless a shadow map tells them: names, `all` without `casts_shadow: false`, or `auto`, "
-        "the first of these.",
+        doc="Lights that cast, unless a shadow map selects them: names, `all` without `casts_shadow: false`, or "
+        "`auto`, the first of these.",
     )
     size: float = param(
         default=0.0, unit="m", min=0, max=100, doc="Diameter of point and spot lights; 0: hard shadows."
@@ -82,8 +86,8 @@ class TracedShadows(Casting):
         max=1.5,
         doc="Angular diameter of directional lights; 0: hard shadows. The sun's is 0.0093.",
     )
-    samples: int = define(default=16, min=1, max=1024, doc="Rays to a light that has a size.")
-    animated: bool = define(default=True, doc="Trace other rays in each frame, for a mean over frames.")
+    samples: int = define(default=16, min=1, max=1024, doc="Rays per pixel to a light that has a size.")
+    animated: bool = define(default=True, doc="Trace different rays in each frame, to be averaged over frames.")
 
     def lights(self, facts: Facts) -> tuple[int, ...]:
         """Return the lights whose shadows are traced, as the scene's indices."""

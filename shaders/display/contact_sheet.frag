@@ -111,7 +111,7 @@ vec3 resampled_value(int picture, ivec2 texel, ivec2 target_size) {
 
 const int NO_LABEL = 0, LABEL_BACKGROUND = 1, LABEL_TEXT = 2;
 
-// What the label of a picture has at a texel, counted from the upper left; `scale` is in texels per font pixel.
+// The part of a picture's label at a texel, counted from the upper left; `scale` is in texels per font pixel.
 int label_at(int picture, ivec2 texel, int scale) {
     int count = 0;
     for (int i = 0; i < LABEL_LENGTH; ++i) {

@@ -41,7 +41,7 @@ float average_luminance() {
 #endif
 }
 
-// Within the limits already before the eye adapts, or it would spend time where no exposure follows it.
+// Limits the luminance before the eye adapts, which would otherwise spend time outside the limits.
 float limited(float average) {
     return clamp(average, key * exp2(-limit), key * exp2(limit));
 }

@@ -4,8 +4,8 @@ doc: |
   Smooth the edges of a finished picture, in one pass.
 
   This is FXAA (Lottes 2009, with the search along edges of 2011). Where the luma changes by more than a fraction of
-  itself, both ends of the edge are searched, and a pixel is blended with its neighbour across the edge, as much as a
-  straight line from end to end would cover of it. It needs no further memory, and treats highlights and alpha masks
+  itself, both ends of the edge are searched, and a pixel is blended with its neighbour across the edge, by the area
+  that a straight line from end to end would cover. It needs no further memory, and treats highlights and alpha masks
   like silhouettes; details smaller than a pixel are lost.
 inputs:
   source: {semantic: display_color, filter: linear, doc: "The finished picture, display-referred."}
@@ -14,9 +14,9 @@ outputs:
 params:
   contrast: {default: 0.125, min: 0, max: 1, doc: "Least difference at an edge, relative to the brightest neighbour."}
   darkest: {default: 0.03125, min: 0, max: 1, doc: "Least difference of luma at an edge in dark regions."}
-  softness: {default: 0.75, min: 0, max: 1, doc: "Blending of single pixels that stand out with their surroundings."}
-  reach: {default: 12, min: 1, max: 64, unit: texels, doc: How far an edge is searched to each side.}
-  transparent: {role: define, default: false, doc: "See edges in alpha, too, by which colours are multiplied."}
+  softness: {default: 0.75, min: 0, max: 1, doc: "Blending of single outlier pixels with their surroundings."}
+  reach: {default: 12, min: 1, max: 64, unit: texels, doc: How far to search along an edge on each side.}
+  transparent: {role: define, default: false, doc: "Detect edges in alpha, too; colours are premultiplied by it."}
 ---*/
 uniform sampler2D source;
 uniform float contrast;
@@ -27,7 +27,7 @@ out vec4 color;
 
 float luma(vec4 c) {
 #if TRANSPARENT
-    c.rgb += c.a - 1.0;  // over what is darker than black, so that black surfaces have edges, too
+    c.rgb += c.a - 1.0;  // over a background darker than black, so that black surfaces have edges, too
 #endif
     return dot(c.rgb, vec3(0.299, 0.587, 0.114));  // of encoded colour (ITU-R BT.601)
 }

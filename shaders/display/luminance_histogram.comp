@@ -1,4 +1,4 @@
-// Counts how much of the picture has which luminance, in bins of an eighth of a stop. Each work group counts in shared
+// Builds a histogram of the picture's luminance, in bins of an eighth of a stop. Each work group counts in shared
 // memory first, because atomics there do not wait for other groups.
 #include <luminance.glsl>
 layout(local_size_x = 16, local_size_y = 16) in;

@@ -1,4 +1,4 @@
-// Gathers what passes over a pixel during the exposure.
+// Gathers the surfaces that pass over a pixel during the exposure.
 // M. McGuire, P. Hennessy, M. Bukowski and B. Osman, "A Reconstruction Filter for Plausible Motion Blur", 2012;
 // J.-P. Guertin, M. McGuire and D. Nowrouzezahrai, "A Fast and Stable Feature-Aware Motion Blur Filter", 2014.
 #include <noise.glsl>
@@ -20,7 +20,7 @@ float nearness(float z, float other) {
     return clamp((other - z) / (depth_tolerance * max(min(z, other), 1e-4)), 0.0, 1.0);
 }
 
-// Whether a motion reaches so far, with a soft edge of half a pixel.
+// Whether a motion reaches a distance, with a soft edge of half a pixel.
 float reaches(float speed, float distance) {
     return clamp(speed - distance + 0.5, 0.0, 1.0);
 }
@@ -60,8 +60,8 @@ void main() {
     }
     radiance = sum / total;
 #else
-    // What passes in front: samples of nearer surfaces along the fastest motion, each of which covers the pixel while
-    // its own motion takes it there. `covered` is their share of the exposure.
+    // Surfaces that pass in front: samples along the fastest motion, each of which covers the pixel while its own
+    // motion takes it there. `covered` is their share of the exposure.
     vec4 front = vec4(0.0), behind = vec4(0.0);
     float covered = 0.0;
     for (int i = 0; i < samples; ++i) {
@@ -72,7 +72,8 @@ void main() {
         covered += weight;
         front += weight * texelFetch(sharp, at, 0);
 
-        // The pixel's own surface as it moves past, and what it uncovers; nearer surfaces are counted above.
+        // The pixel's own surface as it moves past, and the background that it uncovers; nearer surfaces are counted
+        // above.
         at = clamped(gl_FragCoord.xy + own.xy * t);
         float is_nearer = nearness(texelFetch(motion, at, 0).z, own.z);
         behind += mix(texelFetch(sharp, at, 0), center, is_nearer);

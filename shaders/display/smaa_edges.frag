@@ -9,7 +9,7 @@ float luma_at(ivec2 texel) {
     texel = clamp(texel, ivec2(0), textureSize(source, 0) - 1);
     vec4 color = texelFetch(source, texel, 0);
 #if TRANSPARENT
-    color.rgb += color.a - 1.0;  // over what is darker than black, so that black surfaces have edges, too
+    color.rgb += color.a - 1.0;  // over a background darker than black, so that black surfaces have edges, too
 #endif
     return dot(color.rgb, vec3(0.2126, 0.7152, 0.0722));
 }

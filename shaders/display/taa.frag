@@ -42,8 +42,9 @@ float depth_at(ivec2 texel) {
     return texelFetch(depth, clamp(texel, ivec2(0), textureSize(depth, 0) - 1), 0).r;
 }
 
-// The motion of a pixel. Next to a nearer surface it is that surface's, because its antialiased edge covers the pixel:
-// one where depth steps towards a neighbour but not in the opposite direction. Of several, the farthest counts.
+// The motion of a pixel. Next to a nearer surface it is that of this surface, whose antialiased edge covers the pixel.
+// A neighbour is on a nearer surface if depth steps towards it but not in the opposite direction. Of several
+// neighbours, the farthest counts.
 vec2 motion_at(ivec2 texel) {
     ivec2 nearest = texel;
     float center = depth_at(texel), window_depth = center, farthest = 1.0;
@@ -100,7 +101,7 @@ vec3 clip_to_neighborhood(vec3 value, ivec2 texel) {
 }
 
 #if TRANSPARENT
-// The mean of alpha at `uv`, within what alpha is in the 3×3 neighbourhood of a texel.
+// The mean of alpha at `uv`, clamped to the range of alpha in the 3×3 neighbourhood of a texel.
 float moved_coverage(vec2 uv, ivec2 texel) {
     float least = 1.0, most = 0.0;
     for (int i = 0; i < 9; ++i) {

@@ -30,8 +30,8 @@ out vec4 color;              // display-referred
 #include "look.glsl"
 #endif
 
-// White balance, contrast about middle grey and saturation. Values that change nothing are skipped, so that the picture
-// keeps every bit.
+// White balance, contrast about middle grey and saturation. Neutral settings are skipped, so that the picture stays
+// bit-identical.
 vec3 graded(vec3 c) {
     if (white_balance != 6500.0) c = max(adapted_to_daylight(c, white_balance), 0.0);
     if (contrast != 1.0) c = 0.18 * pow(c / 0.18, vec3(contrast));
@@ -85,5 +85,5 @@ void main() {
     color.rgb += (interleaved_gradient_noise(gl_FragCoord.xy) - 0.5) * (0.998 / 255.0);  // keeps exact 8-bit values
 #endif
     if (broken)
-        color.rgb = vec3(1.0, 0.0, 1.0);  // NaN is seen, and found in the picture
+        color.rgb = vec3(1.0, 0.0, 1.0);  // makes NaN visible in the picture
 }

@@ -8,8 +8,8 @@ float distribution_ggx(float NoH, float alpha) {
     return a2 / (PI * d * d);
 }
 
-// The same from unit vectors. Near the peak of a smooth surface, their cross product keeps the digits that 1 - NoH²
-// loses to cancellation.
+// The same from unit vectors, whose cross product keeps the digits that 1 - NoH² loses to cancellation near the peak of
+// a smooth surface.
 float distribution_ggx(vec3 normal, vec3 half_vector, float alpha) {
     vec3 NxH = cross(normal, half_vector);
     float NoH = max(dot(normal, half_vector), 0.0), a = NoH * alpha, d = dot(NxH, NxH) + a * a;
@@ -47,7 +47,7 @@ float distribution_ggx_anisotropic(float NoH, float ToH, float BoH, float alpha_
     return a2 * w2 * w2 / PI;
 }
 
-// Masking-shadowing for it, divided by 4 NoL NoV, with the same alpha_t and alpha_b. light_dir and view_dir are in
+// Anisotropic masking-shadowing, divided by 4 NoL NoV, with the same alpha_t and alpha_b. light_dir and view_dir are in
 // tangent space: x along the tangent, y along the bitangent, z along the normal.
 float visibility_smith_anisotropic(vec3 light_dir, vec3 view_dir, float alpha_t, float alpha_b) {
     vec3 alpha = vec3(alpha_t, alpha_b, 1.0);

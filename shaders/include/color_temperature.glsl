@@ -19,8 +19,7 @@ vec3 blackbody_cones(float kelvin) {
     return xyz_to_cones * vec3(xy.x / xy.y, 1.0, (1.0 - xy.x - xy.y) / xy.y);
 }
 
-// The linear Rec. 709 `color`, seen under a blackbody of `kelvin`, as it would be under one of 6500 K (von Kries
-// adaptation).
+// The linear Rec. 709 `color`, adapted from a blackbody of `kelvin` to one of 6500 K (von Kries adaptation).
 vec3 adapted_to_daylight(vec3 color, float kelvin) {
     const mat3 rec709_to_cones =
         mat3(0.4226580, 0.0556908, 0.0213792, 0.4913566, 0.9615562, 0.0876439, 0.0273645, 0.0231894, 0.9807434);

@@ -68,9 +68,9 @@ float pixel_height(float view_distance) {
     return 2.0 * projected / (depth_views[0].projection[1][1] * depth_views[0].viewport.y);
 }
 
-// A distance in metres that a position from depth lies above or below its surface at most, at `view_distance` metres
-// from the viewer. Rasterisers snap vertices to 1/256 of a pixel, which moves the surface by as much of a pixel's
-// height. That counts in pictures of few pixels.
+// The largest distance, in metres, of a position from depth above or below its surface, at `view_distance` metres from
+// the viewer. Rasterisers snap vertices to 1/256 of a pixel, which moves the surface by the same fraction of a pixel's
+// height. This matters in pictures with few pixels.
 float snapped_by(float view_distance) {
     return pixel_height(view_distance) / 256.0;
 }

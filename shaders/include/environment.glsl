@@ -3,7 +3,7 @@
 
 layout(std140) uniform environment_block {
     vec4 environment_transform;   // cosine and sine of the rotation about +Y, intensity, 0
-    vec4 environment_projection;  // where shadow catchers show the map from; distance where they cease to, or 0
+    vec4 environment_projection;  // where shadow catchers project the map from; distance where they stop, or 0
 };
 
 // Rotates a world-space direction into the space of the environment map.

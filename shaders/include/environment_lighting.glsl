@@ -13,7 +13,7 @@ uniform vec3 ambient;
 #endif
 #endif
 
-// The direction that the specular lobe is looked up in. For anisotropic surfaces the normal is bent towards the normal
+// The direction in which the specular lobe is looked up. For anisotropic surfaces the normal is bent towards the normal
 // of a cylinder along the grain (Revie 2012), more for rough surfaces, as in KHR_materials_anisotropy.
 vec3 reflection_direction(Surface s) {
     vec3 normal = s.normal;
@@ -51,7 +51,7 @@ vec3 prefiltered_environment(Surface s) {
 }
 
 #if defined(HAS_LAYERS) && defined(HAS_ENVIRONMENT_SPECULAR)
-// The environment's light that the layered surface reflects, from what its base reflects: `base`.
+// The environment's light that the layered surface reflects, given the light `base` that its base reflects.
 ReflectedLight layered_environment(Surface s, ReflectedLight base) {
     float NoV = clamp(dot(s.normal, s.view_dir), 0.0, 1.0);
 #ifdef SHEEN_LAYER

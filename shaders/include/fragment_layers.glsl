@@ -1,4 +1,4 @@
-// What the textures of a fragment's layers hold.
+// Texels of the layers of a fragment's material.
 #include <layers.glsl>
 #include <material_texel.glsl>
 #include <texture_coordinates.glsl>
@@ -55,7 +55,7 @@ uniform sampler2D thickness_texture;
 #ifdef HAS_LAYERS
 #define LAYER_TEXEL(sampler, slot, set) material_texel(sampler, slot_uv(material, slot, UV_SET(set)))
 
-// What the textures of the layers hold here; the coat's normal is `normal` without a map of its own.
+// The layers' texels at this fragment; the coat's normal is `normal` if it has no map of its own.
 LayerTexels layer_texels(int material, MaterialData m, vec3 normal, vec3 tangent, vec3 bitangent) {
     LayerTexels layers = LayerTexels(vec2(1.0), vec4(1.0), vec2(1.0), vec2(1.0), normal);
 #ifdef CLEARCOAT_LAYER

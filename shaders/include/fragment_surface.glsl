@@ -1,5 +1,5 @@
 // The surface of a fragment of the scene's geometry, from varyings, material factors and textures.
-#ifndef NO_LAYERS  // a shader that lights otherwise than per fragment leaves layers out
+#ifndef NO_LAYERS  // shaders that do not light per fragment leave layers out
 #define FRAGMENT_LAYERS
 #endif
 #include <alpha_mask.glsl>

@@ -20,7 +20,7 @@ centroid out vec4 v_tangent;
 #endif
 
 #ifdef HAS_TRANSMISSION
-flat out float v_scale;  // of the object: the cube root of what it does to volumes
+flat out float v_scale;  // of the object: the cube root of its scale of volumes
 #endif
 
 // Writes gl_Position and every varying of this vertex: `v_position`, `v_normal`, `v_object`, those of the material, of

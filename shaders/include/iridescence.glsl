@@ -29,7 +29,7 @@ vec3 interface_f0(vec3 inside, float outside) {
 // Reflectance, linear RGB 0 to 1, of a film of this `ior` and `thickness` (nm) in air on a base of reflectance `f0`, at
 // the cosine VoH of the angle to the (micro-)normal.
 vec3 film_reflectance(float ior, float thickness, vec3 f0, float VoH) {
-    ior = mix(1.0, ior, smoothstep(0.0, 30.0, thickness));  // a vanishing film leaves the base as it is
+    ior = mix(1.0, ior, smoothstep(0.0, 30.0, thickness));  // a vanishing film leaves the base unchanged
     float sine2 = (1.0 - VoH * VoH) / (ior * ior);
     if (sine2 >= 1.0) return vec3(1.0);
     float cosine = sqrt(1.0 - sine2);  // within the film

@@ -1,10 +1,10 @@
-// Direct light on a surface with layers; nothing without any.
+// Direct light on a surface with layers; unchanged without layers.
 #include <layers.glsl>
 #include <shading.glsl>
 
 #ifdef HAS_LAYERS
-// The light of one source that the layered surface reflects, from what its base reflects: `base`, which `shade` gave.
-// Exchanging viewer and light changes nothing but the cosine, as for `shade`.
+// The light of one source that the layered surface reflects, given the light `base` that its base reflects, from
+// `shade`. As for `shade`, exchanging viewer and light only changes the cosine.
 ReflectedLight layered_light(Surface s, vec3 light_dir, ReflectedLight base) {
     vec3 half_vector = normalize(light_dir + s.view_dir);
 #ifdef SHEEN_LAYER

@@ -1,6 +1,7 @@
 // The layers of a material (KHR_materials_clearcoat, sheen, iridescence, transmission and volume) at a point: their
-// values, their light, and what they leave of the light below them. From the top: coat, sheen, base. The base reflects
-// by its film, if it has one. `surface.glsl` says which layers there are; every function is the identity without any.
+// values, their light, and how they attenuate the light below them. From the top: coat, sheen, base. A film, if there
+// is one, sets the reflectance of the base. `surface.glsl` defines which layers exist; without layers, every function
+// is the identity.
 #include <surface.glsl>
 #if defined(CLEARCOAT_LAYER) || defined(TRANSMISSION_LAYER)
 #include <brdf.glsl>
@@ -14,17 +15,17 @@
 #endif
 
 #ifdef HAS_LAYERS
-// What the layers' textures hold; 1 where there is none.
+// Texels of the layers' textures; 1 where there is no texture.
 struct LayerTexels {
     vec2 clearcoat;  // factor, roughness
     vec4 sheen;      // colour, roughness
-    vec2 iridescence;   // factor; where between the two thicknesses
+    vec2 iridescence;   // factor; position between the two thicknesses
     vec2 transmission;  // factor, thickness
     vec3 clearcoat_normal;  // of the coat in world space, unit
 };
 
-// Fills in the layers of a surface that is complete but for them. `texels` hold the coat's normal in any case; `scale`
-// is that of the object.
+// Fills in the layers of an otherwise complete surface. `texels` always hold the coat's normal; `scale` is that of the
+// object.
 void material_layers(inout Surface s, MaterialData m, LayerTexels texels, float scale) {
     float NoV = clamp(dot(s.normal, s.view_dir), 0.0, 1.0);
 #ifdef TRANSMISSION_LAYER
@@ -44,8 +45,8 @@ void material_layers(inout Surface s, MaterialData m, LayerTexels texels, float 
     s.film_f0 = mix(s.f0, schlick_f0(film, NoV), s.iridescence);
 #endif
 #ifdef TRANSMISSION_LAYER
-#if !defined(TRANSMITS) && !defined(PASSES_LIGHT)  // nothing brings what is behind
-    // The surface is blended over what is behind it, with all that it reflects.
+#if !defined(TRANSMITS) && !defined(PASSES_LIGHT)  // no step provides the light behind
+    // The surface, with all its reflections, is blended over what is behind it.
     float opacity = max(1.0 - s.transmission * (1.0 - fresnel_schlick(vec3(s.dielectric.r), 1.0, NoV).r), 1e-3);
     s.alpha *= opacity;
     s.diffuse /= opacity;
@@ -76,7 +77,7 @@ float sheen_albedo(Surface s, float cosine) {
     return 4.0 * textureLod(brdf_table, vec2(sqrt(clamp(cosine, 0.0, 1.0)), s.sheen_roughness), 0.0).z;
 }
 
-// What sheen leaves of the light between the base and a direction with this albedo of white sheen.
+// Fraction of the light between the base and a direction that passes through sheen; `albedo` is that of white sheen.
 float below_sheen(Surface s, float albedo) {
     return 1.0 - max(max(s.sheen_color.r, s.sheen_color.g), s.sheen_color.b) * min(albedo, 1.0);
 }
@@ -88,7 +89,7 @@ float clearcoat_reflectance(Surface s, float cosine) {
     return s.clearcoat * fresnel_schlick(vec3(0.04), 1.0, clamp(cosine, 0.0, 1.0)).r;
 }
 
-// What the coat leaves of the light between the base and two directions, unit vectors.
+// Fraction of light that passes through the coat from `light_dir` to the base and on to the viewer.
 float below_clearcoat(Surface s, vec3 light_dir) {
     float to_light = clearcoat_reflectance(s, dot(s.clearcoat_normal, light_dir));
     return 1.0 - max(to_light, clearcoat_reflectance(s, dot(s.clearcoat_normal, s.view_dir)));

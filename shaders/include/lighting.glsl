@@ -12,7 +12,7 @@ vec3 shadow_positions[2], shadow_normals[2];
 float unshadowed_luminance = 0.0, luminance_difference = 0.0;
 #endif
 
-// Light of one source that the surface reflects to the viewer; `light` is the scene's index.
+// Light of one source that the surface reflects to the viewer; `light` is its index in the scene.
 ReflectedLight direct_lighting(Surface s, int light) {
 #if LIGHT_COUNT > 0 && !defined(NO_LIGHTS)
     vec3 light_dir;

@@ -17,9 +17,9 @@ layout(std140) uniform light_block {
 };
 #endif
 
-// Irradiance on a surface that faces the light, in lux, at a world-space position; and
-// the unit vector to the light in `light_dir`. All kinds of lights share one formula: what a kind lacks has a neutral
-// value, and terms that no light of the scene needs are not compiled.
+// Irradiance on a surface that faces the light, in lux, at a world-space position, and the unit vector to the light in
+// `light_dir`. All types of lights share one formula: properties that a type lacks have neutral values, and terms that
+// no light of the scene needs are not compiled.
 vec3 irradiance_from(Light light, vec3 position, out vec3 light_dir) {
     vec3 irradiance = light.color.rgb;
 #if LIGHT_DIRECTIONALS == LIGHT_COUNT

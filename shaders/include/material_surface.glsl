@@ -1,9 +1,9 @@
-// From a material, what its textures hold and a tangent frame to everything that a shading model reads. Geometry passes
+// Computes everything that a shading model reads from a material, its texels and a tangent frame. Geometry passes
 // (`fragment_surface.glsl`) and the scene's data (`scene.glsl`) share this code.
 #include <math.glsl>
 #include <surface.glsl>
 
-// What the textures of a material hold at one point, all but the base colour's; a factor of 1 where there is none.
+// Texels of a material at one point, all except the base colour; a factor of 1 where there is no texture.
 struct MaterialTexels {
     vec3 metallic_roughness;
     vec4 specular;    // rgb = specular colour; a = specular factor
@@ -17,16 +17,15 @@ struct MaterialTexels {
     bool has_occlusion;
 };
 
-// Texels that leave a material's own values as they are, for materials without textures.
+// Texels that leave a material's own values unchanged, for materials without textures.
 MaterialTexels no_texels() {
     return MaterialTexels(
         vec3(1.0), vec4(1.0), vec3(0.5, 0.5, 1.0), vec3(1.0, 0.5, 1.0), 1.0, vec3(1.0), false, false, false, false);
 }
 
-// Tangent along the rows of the normal map and bitangent up its columns, of one length at most 1, from the differences
-// of position (`position_a`, `position_b`) and of texture coordinates (`uv_a`, `uv_b`) along two directions of the
-// surface, a and b (Schueler 2013). Any two directions of a triangle give the same frame, from whichever side it is
-// seen.
+// Tangent along the rows of the normal map and bitangent up its columns, of equal length, at most 1, from the
+// differences of position (`position_a`, `position_b`) and of texture coordinates (`uv_a`, `uv_b`) along two directions
+// of the surface, a and b (Schueler 2013). Any two directions of a triangle give the same frame, seen from either side.
 void uv_tangent_frame(
     vec3 normal, vec3 position_a, vec3 position_b, vec2 uv_a, vec2 uv_b, out vec3 tangent, out vec3 bitangent) {
     vec3 perpendicular_a = cross(position_b, normal), perpendicular_b = cross(normal, position_a);
@@ -47,7 +46,7 @@ void uv_tangent_frame(
 
 // Completes a surface that has its position, view_dir, base colour and alpha, and the interpolated normal with the
 // tangent frame: `tangent` and `bitangent` are read where there is a normal map, and with NEEDS_GRAIN. `texels` are
-// those of the material's textures; `flip_normal` turns the normal over, for the back of a double-sided material; `lit`
+// those of the material's textures; `flip_normal` reverses the normal, for the back of a double-sided material; `lit`
 // is false for unlit materials.
 void material_surface(inout Surface s, MaterialData m, MaterialTexels texels, bool flip_normal, bool lit) {
     s.metallic = m.surface.x * texels.metallic_roughness.b;

@@ -14,7 +14,7 @@ in vec4 in_color;
 centroid out vec4 v_color;
 #endif
 
-// Writes `v_material`, and the texture coordinates and the vertex colour that the material looks at.
+// Writes `v_material`, and the texture coordinates and the vertex colour that the material reads.
 void write_material_varyings() {
     v_material = in_ids.x;
 #ifdef HAS_UV0

@@ -1,4 +1,4 @@
-// Light that rays find behind transmissive surfaces, without refraction.
+// Light that rays find through transmissive surfaces, without refraction.
 #include <scene.glsl>
 #include <trace.glsl>
 

@@ -1,15 +1,15 @@
-// Moves the vertices of one mesh by morph targets and joints, once for each pose, into the streams that everything
-// reads: p' = sum over joints of weight * matrix * (p + sum over targets of weight * displacement), as glTF 2.0 §3.7.2
-// and §3.7.3 have it. Normals follow the cofactor matrix, which is right for any scale.
+// Deforms the vertices of one mesh by morph targets and joints, once for each pose, and writes the streams that all
+// passes read: p' = sum over joints of weight * matrix * (p + sum over targets of weight * displacement), as in glTF
+// 2.0 §3.7.2 and §3.7.3. Normals are transformed by the cofactor matrix, which is right for any scale.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer rest_block {
-    // Of each vertex position, normal, tangent where there are some, its joints, their weights, and for each target the
-    // displacements of position, normal and tangent, as far as there are some.
+    // For each vertex: position, normal, tangent if there is one, its joints, their weights, and for each target the
+    // displacements of position, normal and tangent, if there are any.
     float rest[];
 };
 layout(std430, binding = 1) readonly buffer pose_block {
-    float pose[];  // of each mesh rows of its joints' matrices, 12 each, then the weights of its targets
+    float pose[];  // for each mesh: rows of its joints' matrices, 12 floats each, then the weights of its targets
 };
 layout(std430, binding = 2) writeonly buffer position_block {
     float positions[];
@@ -26,7 +26,7 @@ layout(std430, binding = 4) writeonly buffer tangent_block {
 layout(std430, binding = 5) writeonly buffer vertex_block {
     float vertices[];  // `scene_vertices` of `scene.glsl`
 };
-uniform int vertex_width;  // floats of one of them
+uniform int vertex_width;  // floats per vertex
 #endif
 
 uniform ivec4 mesh;    // first vertex in the streams, number of vertices, where the mesh begins in `rest`, in `pose`

@@ -1,4 +1,4 @@
-// Where the objects were in the frame before, for steps that read an input of `SceneData`.
+// Where the objects were in the previous frame, for steps that read an input of `SceneData`.
 #include <scene.glsl>
 
 layout(std430) readonly buffer scene_previous_block {
@@ -7,11 +7,11 @@ layout(std430) readonly buffer scene_previous_block {
 
 #ifdef SCENE_POSED
 layout(std430) readonly buffer scene_previous_position_block {
-    float scene_previous_positions[];  // object-space positions of the vertices in the frame before, 3 each
+    float scene_previous_positions[];  // object-space positions of the vertices in the previous frame, 3 floats each
 };
 #endif
 
-// Object-space position of a vertex in the frame before, in metres.
+// Object-space position of a vertex in the previous frame, in metres.
 vec3 scene_previous_vertex_position(int vertex) {
 #ifdef SCENE_POSED
     int at = 3 * vertex;
@@ -21,7 +21,7 @@ vec3 scene_previous_vertex_position(int vertex) {
 #endif
 }
 
-// World-space position in the frame before of a point of a triangle.
+// World-space position of a point of a triangle in the previous frame.
 vec3 scene_previous_position(int instance, int triangle, vec2 barycentrics) {
     ivec3 v = scene_triangle(instance, triangle);
     vec3 w = scene_weights(barycentrics);

@@ -65,7 +65,8 @@ vec4 reflections_at_fragment() {
 #endif
 
 // The light of `environment`, scaled by occlusion and multiplied by the reflectance. `reflections` replace its specular
-// part by their confidence. Of the constant ambient light they replace what metals reflect. They are not occluded.
+// part, weighted by their confidence. With constant ambient light, they replace the part that metals reflect. They are
+// not occluded.
 ReflectedLight reflected_environment(Surface s, ReflectedLight environment) {
 #if !defined(NO_LIGHTS) && (TERMS == TERMS_ALL || TERMS == TERMS_AMBIENT)
     float visibility = environment_visibility(s);
@@ -135,7 +136,7 @@ vec3 radiance_of(Surface s, ReflectedLight direct, ReflectedLight environment, b
 #endif
 }
 
-// The same, `direct` and `environment` lighting with their specular parts.
+// The same with the specular parts of `direct` and `environment` lighting.
 vec3 radiance_of(Surface s, ReflectedLight direct, ReflectedLight environment) {
     return radiance_of(s, direct, environment, true);
 }

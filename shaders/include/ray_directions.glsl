@@ -1,4 +1,4 @@
-// Directions of rays: points of a low-discrepancy sequence, shifted by another amount at each pixel, on a disc or a
+// Directions of rays: points of a low-discrepancy sequence, shifted by a different amount at each pixel, on a disc or a
 // hemisphere.
 #include <math.glsl>
 
@@ -33,9 +33,9 @@ vec3 cosine_direction(vec3 normal, vec2 xi) {
     return tangent * disc.x + cross(normal, tangent) * disc.y + normal * sqrt(max(1.0 - dot(disc, disc), 0.0));
 }
 
-// A distance in metres that float32 coordinates at a point, computed from a depth texture or interpolated, are off by
-// at most. Rays begin that far above their surface. `view_distance` is its distance from the viewer, in metres. In
-// pictures of few pixels a depth texture is off by more, as rasterisers snap vertices: see `snapped_by`.
+// The largest error, in metres, of float32 coordinates at a point that are interpolated or computed from a depth
+// texture. Rays begin this far above their surface. `view_distance` is the point's distance from the viewer, in metres.
+// In pictures with few pixels a depth texture is less accurate, because rasterisers snap vertices: see `snapped_by`.
 float ray_offset(vec3 position, float view_distance) {
     vec3 size = abs(position);
     return 1e-4 * max(max(size.x, size.y), max(size.z, abs(view_distance)));

@@ -1,4 +1,4 @@
-// Random directions and their densities in 1/sr, for shading models that choose the directions of reflected light.
+// Random directions and their densities in 1/sr, for shading models that sample directions of reflected light.
 #include <brdf.glsl>
 #include <luminance.glsl>
 
@@ -22,13 +22,13 @@ vec3 sample_cosine_power(vec2 xi, float n) {
 }
 
 // The unit vector to the viewer in tangent space, above the horizon. Interpolated and mapped normals may turn away from
-// the viewer; directions are then chosen as for a viewer at grazing incidence, and their density is of this choice.
+// the viewer; directions are then chosen as for a viewer at grazing incidence, and have the density of this choice.
 vec3 viewer_above(vec3 v) {
     return normalize(vec3(v.xy, max(v.z, 1e-4)));
 }
 
-// Microfacet normal of GGX as far as it is visible along `v`, in tangent space, from a point `xi` of the unit square
-// (E. Heitz, "Sampling the GGX Distribution of Visible Normals", 2018). alpha: along x and y.
+// GGX microfacet normal from those visible along `v`, in tangent space, from a point `xi` of the unit square (E. Heitz,
+// "Sampling the GGX Distribution of Visible Normals", 2018). alpha: along x and y.
 vec3 sample_visible_normal(vec3 v, vec2 alpha, vec2 xi) {
     vec3 stretched = normalize(vec3(alpha * v.xy, v.z));
     float across = dot(stretched.xy, stretched.xy);
@@ -45,7 +45,7 @@ float visible_normal_density(vec3 v, vec2 alpha) {
     return 0.5 / (v.z + sqrt(v.z * v.z + dot(alpha * v.xy, alpha * v.xy)));
 }
 
-// The chance that `lobe` is chosen and not the `other` one, by their energy. Neither is left out.
+// The probability of choosing `lobe` and not the `other` one, by their energy. Neither is left out.
 float lobe_share(vec3 lobe, vec3 other) {
     float a = luminance_of(lobe), b = luminance_of(other);
     return b <= 0.0 ? 1.0 : a <= 0.0 ? 0.0 : clamp(a / (a + b), 0.1, 0.9);

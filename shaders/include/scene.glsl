@@ -1,15 +1,16 @@
-// The scene as data, for steps that read an input of `SceneData`: from an instance, a triangle of it and barycentrics
-// to positions, normals and the `Surface` that geometry passes shade. An instance is an object of the scene, with the
-// same number. Triangles are numbered within their mesh, as in `gl_PrimitiveID` of a geometry pass. Barycentrics are
-// the weights of the triangle's second and third vertex.
+// The scene as data, for steps that read an input of `SceneData`: maps an instance, one of its triangles and
+// barycentrics to positions, normals and the `Surface` that geometry passes shade. An instance is an object of the
+// scene, with the same number. Triangles are numbered within their mesh, as in `gl_PrimitiveID` of a geometry pass.
+// Barycentrics are the weights of the triangle's second and third vertex.
 #include <material_surface.glsl>
 #include <layers.glsl>
 #include <math.glsl>
 #include <scene_textures.glsl>
 #include <surface.glsl>
 
-// As `tangent_frame()` of `fragment_surface.glsl`: the mesh's own tangents, else along the texture coordinates of the
-// normal map. `v`, `w` and `corners` are the triangle's vertices, their weights and their world-space positions.
+// Like `tangent_frame()` of `fragment_surface.glsl`: the mesh's own tangents, or else tangents along the texture
+// coordinates of the normal map. `v`, `w` and `corners` are the triangle's vertices, their weights and their
+// world-space positions.
 void scene_tangent_frame(
     int instance, ivec3 v, vec3 w, mat3 corners, vec3 normal, out vec3 tangent, out vec3 bitangent) {
 #ifdef SCENE_TANGENTS_STREAM
@@ -32,8 +33,8 @@ void scene_tangent_frame(
 }
 
 #if defined(SCENE_LAYERS) && defined(HAS_LAYERS)
-// What the textures of the layers hold at a point, as `layer_texels` of `fragment_layers.glsl`. `normal` is that of the
-// geometry, with its tangent frame, `c` the coordinates of textures; `flip_normal` turns normals of maps to the back.
+// The layers' texels at a point, like `layer_texels` of `fragment_layers.glsl`. `normal` is that of the geometry, with
+// its tangent frame, and `c` are the texture coordinates; `flip_normal` reverses the normals of maps.
 LayerTexels scene_layer_texels(
     int instance, SceneCoordinates c, MaterialData m, vec3 normal, vec3 tangent, vec3 bitangent, bool flip_normal) {
     LayerTexels layers = LayerTexels(vec2(1.0), vec4(1.0), vec2(1.0), vec2(1.0), normal);
@@ -81,7 +82,7 @@ LayerTexels scene_layer_texels(
 #endif
 
 // Everything a shading model reads: the surface that a geometry pass shades there, seen along -view_dir. Nothing is
-// discarded: `scene_alpha` is compared with the material's cutoff by the caller, where there is SCENE_MASKED.
+// discarded: `scene_alpha` is compared with the material's cutoff by the caller, if SCENE_MASKED is defined.
 Surface scene_surface(int instance, int triangle, vec2 barycentrics, vec3 view_dir) {
     int flags = scene_instance(instance).flags;
     MaterialData m = materials[MATERIAL_INDEX(scene_instance(instance).material)];
@@ -103,7 +104,7 @@ Surface scene_surface(int instance, int triangle, vec2 barycentrics, vec3 view_d
     vec3 normal = scene_normal_to_world(instance, scene_vertex_normal(v.x)) * w.x;
     normal += scene_normal_to_world(instance, scene_vertex_normal(v.y)) * w.y;
     normal += scene_normal_to_world(instance, scene_vertex_normal(v.z)) * w.z;
-    // Objects that are scaled to a plane, and some files, have none.
+    // Objects that are scaled to a plane, and those of some files, have no normals.
     s.normal = dot(normal, normal) > 1e-30 ? normalize(normal) : front;
 
     MaterialTexels texels = no_texels();

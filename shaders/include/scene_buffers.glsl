@@ -1,13 +1,12 @@
-// The buffers of the scene as data, and what lies in them: vertices, instances and emitting triangles. Vertices and
-// instances are fetched as texels, which software rasterisers do in a third of the time that elements of a storage
-// block take them.
+// The buffers of the scene as data: vertices, instances and emitting triangles. Vertices and instances are fetched as
+// texels, because software rasterisers fetch those in a third of the time of elements of a storage block.
 struct SceneInstance {
     vec4 rows[3];       // of the affine object-to-world matrix
     int material;       // number in `materials`
     int mesh;
     int flags;          // SCENE_CASTS_SHADOW and others
     int first_index;    // of its triangles in `scene_indices`
-    int base_vertex;    // is added to those indices
+    int base_vertex;    // added to those indices
     int triangles;
     int first_emitter;  // the number of its triangle 0 in `scene_emitters`; -1 if it emits no light
     int padding;
@@ -15,7 +14,7 @@ struct SceneInstance {
     vec4 box_extent;    // xyz: half of the box's sides
 };
 
-// What a geometry step draws of one object, for its `commands`.
+// The command with which a geometry step draws one object, for its `commands`.
 struct DrawCommand {
     uint count;
     uint instances;
@@ -24,14 +23,14 @@ struct DrawCommand {
     uint base_instance;
 };
 
-// A triangle that emits light, in this frame or another. Those of an instance follow each other in their own order.
+// A triangle that emits light, in this frame or another. Those of an instance are consecutive and keep their order.
 struct SceneEmitter {
     int instance;
     int triangle;
 };
 
-uniform samplerBuffer scene_vertex_texels;     // of each vertex SCENE_VERTEX_ROWS: position, normal, streams
-uniform isamplerBuffer scene_instance_texels;  // `scene_instances`, and behind them the textures of materials
+uniform samplerBuffer scene_vertex_texels;     // SCENE_VERTEX_ROWS per vertex: position, normal, streams
+uniform isamplerBuffer scene_instance_texels;  // `scene_instances`, followed by the textures of materials
 layout(std430) readonly buffer scene_index_block {
     uint scene_indices[];
 };
@@ -59,7 +58,7 @@ bool scene_has(int instance, int flag) {
     return (scene_instance(instance).flags & flag) != 0;
 }
 
-// The command that draws an instance, or nothing where `is_drawn` is false.
+// The command that draws an instance, or nothing if `is_drawn` is false.
 DrawCommand scene_draw_command(int instance, bool is_drawn) {
     SceneInstance i = scene_instance(instance);
     return DrawCommand(uint(3 * i.triangles), is_drawn ? 1u : 0u, uint(i.first_index), i.base_vertex, uint(instance));

@@ -33,21 +33,21 @@ SceneCoordinates scene_coordinates(ivec3 v, vec3 w) {
 }
 
 #ifdef SCENE_TEXTURES
-// Of a material's slot: array (-1 without a texture), layer, width | height << 16, and bits: UV set, 2 without
-// filtering, 4 and 16 times the wrap mode along s and t (0 repeat, 1 mirror, 2 clamp).
+// The texture of a material's slot: array (-1 without a texture), layer, width | height << 16, and bits: UV set, 2
+// without filtering, 4 and 16 times the wrap mode along s and t (0 repeat, 1 mirror, 2 clamp).
 ivec4 scene_texture(int material, int slot) {
     int first = SCENE_INSTANCE_ROWS * SCENE_INSTANCE_COUNT;
     return texelFetch(scene_instance_texels, first + material * MATERIAL_SLOTS + slot);
 }
 
-// A texture coordinate `u` from 0 to 1, as the wrap `mode` of a sampler has it: 0 repeats, 1 mirrors, 2 clamps.
+// A texture coordinate `u`, wrapped to 0 to 1 by the `mode` of a sampler: 0 repeats, 1 mirrors, 2 clamps.
 float scene_wrapped(float u, int mode) {
     float mirrored = 1.0 - abs(mod(u, 2.0) - 1.0);
     return mode == 0 ? fract(u) : mode == 1 ? mirrored : clamp(u, 0.0, 1.0);
 }
 
-// The texel of a slot at level 0 as its sampler has it, at the coordinates `c`; false if the material or the mesh lacks
-// it. `arrays` are the arrays that textures of the slot lie in, a constant. The border of a layer holds what lies
+// The texel of a slot at level 0, as its sampler returns it at the coordinates `c`; false if the material or the mesh
+// lacks it. `arrays`, a constant, are the arrays that hold textures of the slot. The border of a layer holds the texels
 // across the image's edges.
 bool scene_texel(int instance, int slot, int arrays, SceneCoordinates c, out vec4 texel) {
     int material = MATERIAL_INDEX(scene_instance(instance).material);

@@ -14,7 +14,7 @@ vec3 scene_direction_to_world(int instance, vec3 direction) {
     return vec3(dot(rows[0].xyz, direction), dot(rows[1].xyz, direction), dot(rows[2].xyz, direction));
 }
 
-// As `normal_to_world()` of `transform.glsl`: the cofactor matrix, with the sign of the determinant.
+// Like `normal_to_world()` of `transform.glsl`: the cofactor matrix, with the sign of the determinant.
 vec3 scene_normal_to_world(int instance, vec3 normal) {
     vec4 rows[3] = scene_instance(instance).rows;
 #ifdef UNIFORM_SCALE
@@ -54,8 +54,8 @@ vec2 scene_barycentrics(int instance, int triangle, vec3 position) {
     return vec2(dot(cross(offset, b), normal), dot(cross(a, offset), normal)) / max(dot(normal, normal), 1e-37);
 }
 
-// Unit normal of a triangle on its front side, where it runs counter-clockwise; of mirrored objects where it runs
-// clockwise, as their winding is reversed.
+// Unit normal of a triangle on its front side, where its vertices run counter-clockwise, or clockwise for mirrored
+// objects, whose winding is reversed.
 vec3 scene_geometric_normal(int instance, int triangle) {
     mat3 p = scene_corners(instance, triangle);
     vec3 normal = cross(p[1] - p[0], p[2] - p[0]);

@@ -8,14 +8,14 @@
 // ks and the exponent, `needs(grain)` for the anisotropy, `needs(grain_where_any)` for the anisotropy of the materials
 // that have one, and `needs(nothing)` for a model that uses no light, only the base colour.
 //
-// A model may say which directions matter to it, for a node that follows paths of light. With SAMPLES_DIRECTIONS it
-// then defines HAS_SAMPLED_DIRECTIONS and
+// A model may provide importance sampling, for nodes that trace paths of light. With SAMPLES_DIRECTIONS it then defines
+// HAS_SAMPLED_DIRECTIONS and
 //
 //     vec3 sample_direction(Surface surface, vec3 xi)                 // a unit vector, from numbers from 0 to 1
 //     float direction_density(Surface surface, vec3 light_dir)        // the density of this direction, in 1/sr
 //
-// Directions below the horizon carry no light. Others may have any density above 0; light of one without is lost. A
-// model without these functions is sampled by the cosine.
+// Directions below the horizon carry no light. Others may have any density above 0; light from directions of density 0
+// is lost. A model without these functions is sampled by the cosine.
 #include <surface.glsl>
 
 struct ReflectedLight {

@@ -1,14 +1,15 @@
-// Shadow catchers: surfaces that show what is behind them, as dark as the shadows and the occlusion on them. A catcher
-// is a diffuse surface whose reflectance is such that it reflects just that where nothing shadows it: all techniques of
-// shadows, occlusion and indirect light apply to it (P. Debevec, "Rendering Synthetic Objects into Real Scenes", 1998).
+// Shadow catchers: surfaces that show what is behind them, darkened by the shadows and the occlusion on them. A catcher
+// is a diffuse surface whose reflectance is chosen so that, without shadows, it reflects exactly what is behind it: all
+// techniques for shadows, occlusion and indirect light apply to it (P. Debevec, "Rendering Synthetic Objects into Real
+// Scenes", 1998).
 #include <environment.glsl>
 #include <lights.glsl>
 #include <surface.glsl>
 
 const float CATCHER_F0 = 0.04, CATCHER_F90 = 0.4;  // reflectance straight on and at grazing angles
 
-// How far a catcher shows the environment as the background does: 0 near the point of projection, 1 from its distance
-// on, and without a projection.
+// How much a catcher shows the environment like the background: 0 near the point of projection, 1 from its distance on,
+// and 1 without a projection.
 float catcher_fade(vec3 position) {
     float reach = environment_projection.w;
     return reach > 0.0 ? smoothstep(0.3, 1.0, length(position.xz - environment_projection.xz) / reach) : 1.0;
@@ -26,8 +27,8 @@ float catcher_reflectance(Surface s) {
     return mix(CATCHER_F0, CATCHER_F90, square * square * grazing) * (1.0 - catcher_fade(s.position));
 }
 
-// Light that a catcher receives where nothing shadows it, as radiance of a white surface. `from_all_sides` is the
-// irradiance / π of the environment or the constant ambient light.
+// Light that a catcher receives without shadows, as radiance of a white surface. `from_all_sides` is the irradiance / π
+// of the environment or the constant ambient light.
 vec3 unshadowed_light(Surface s, vec3 from_all_sides) {
     vec3 sum = from_all_sides;
 #ifdef NEEDS_PHONG  // empirical models reflect kd of the irradiance of lights, without 1/π
@@ -45,8 +46,8 @@ vec3 unshadowed_light(Surface s, vec3 from_all_sides) {
     return sum;
 }
 
-// Makes a catcher the surface that reflects `shown` of this unshadowed light. Shadows fade out together with the
-// projection, if there is one.
+// Gives a catcher the reflectance with which it reflects `shown` of the `unshadowed` light. Shadows fade out together
+// with the projection, if there is one.
 void catch_shadows(inout Surface s, vec3 shown, vec3 unshadowed) {
     float fade = environment_projection.w > 0.0 ? catcher_fade(s.position) : 0.0;
     s.base_color = shown;

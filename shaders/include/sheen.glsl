@@ -2,7 +2,7 @@
 // BRDF", 2017), as in KHR_materials_sheen.
 #include <math.glsl>
 
-const float LEAST_SHEEN_ROUGHNESS = 0.07;  // the distribution is a spike beyond float32 below
+const float LEAST_SHEEN_ROUGHNESS = 0.07;  // below, the distribution is a spike beyond float32
 
 // Distribution of fibre normals, in 1/sr, from the cosine NoH of the half vector's angle. `roughness` is perceptual.
 float distribution_charlie(float NoH, float roughness) {
@@ -24,7 +24,7 @@ float charlie_masking(float cosine, float alpha) {
                             : 2.0 * charlie_fit(0.5, alpha) - charlie_fit(max(1.0 - cosine, 1e-5), alpha));
 }
 
-// Distribution times masking, in 1/sr: the BRDF of white sheen, before it is limited to what arrives.
+// Distribution times masking, in 1/sr: the BRDF of white sheen, before it is limited to the arriving light.
 float charlie_brdf(float NoL, float NoV, float NoH, float roughness) {
     float alpha = roughness * roughness;
     float masking = 1.0 + charlie_masking(NoV, alpha) + charlie_masking(NoL, alpha);

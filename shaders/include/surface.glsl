@@ -44,7 +44,7 @@ struct Surface {
     float iridescence;  // factor
     float film_ior;
     float film_thickness;  // nm
-    vec3 film_f0;  // the f0 that stands for the film where the viewer looks from
+    vec3 film_f0;  // the f0 that stands for the film in the direction of the viewer
 #endif
 #ifdef TRANSMISSION_LAYER
     float transmission;  // fraction of the light that enters and passes through
@@ -70,8 +70,8 @@ void physical_reflectance(inout Surface s, vec4 dielectric) {
 #endif
 #endif
 
-// Leaves to the diffuse lobe only the light that the specular lobe of the dielectric part does not reflect. The
-// greatest channel counts, so that coloured reflections do not tint the diffuse lobe (KHR_materials_specular).
+// Leaves to the diffuse lobe only the light that the specular lobe of the dielectric part does not reflect. The largest
+// channel counts, so that coloured reflections do not tint the diffuse lobe (KHR_materials_specular).
 void share_energy(inout Surface s) {
 #ifdef SHARES_ENERGY
     float NoV = clamp(dot(s.normal, s.view_dir), 0.0, 1.0);
@@ -87,8 +87,8 @@ float phong_exponent(float roughness) {
 }
 
 #ifdef MATERIAL_COUNT
-// f0 (rgb) and f90 (w) of a material's dielectric part; `specular` has its specular colour and, in w, factor at this
-// point.
+// f0 (rgb) and f90 (w) of a material's dielectric part; `specular` has its specular colour and, in w, its specular
+// factor at this point.
 vec4 dielectric_of(MaterialData m, vec4 specular) {
 #ifdef DEFAULT_SPECULAR  // all materials have the default index of refraction and specular colour
     return vec4(0.04, 0.04, 0.04, 1.0);

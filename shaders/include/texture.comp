@@ -1,4 +1,4 @@
-// Evaluates a kind of generated texture, `#include <TEXTURE>`, into base colour, and then into normals with height, and
+// Evaluates a kind of generated texture, `#include <TEXTURE>`: first base colour, then normals with height, and
 // occlusion, roughness and metallic. Each texel is the mean of several points, so that edges are smooth.
 #include <srgb.glsl>
 #include <TEXTURE>
@@ -32,8 +32,8 @@ void sample_texel(ivec2 texel) {
     imageStore(fields, texel, vec4(field / count, 0.0));
 }
 
-// The share of the sky's cosine-weighted light that heights around a texel leave: along each of 8 directions the
-// highest horizon h hides sin² h of it.
+// The share of the sky's cosine-weighted light that is not hidden by heights around a texel: along each of 8 directions
+// the highest horizon h hides sin² h of it.
 float open_sky(ivec2 texel, float height) {
     float open = 0.0;
     for (int direction = 0; direction < 8; ++direction) {

@@ -1,6 +1,6 @@
-// What a kind of generated texture gives at one point, and noise that repeats, for files that define
-// `TextureSample texture_sample(vec2 uv)`: `uv` is 0 to 1 over one tile, u to the right and v downwards, and opposite
-// sides must fit together.
+// The values of a generated texture at one point, and noise that repeats, for files that define `TextureSample
+// texture_sample(vec2 uv)`: `uv` is 0 to 1 over one tile, u to the right and v downwards, and opposite sides must fit
+// together.
 
 struct TextureSample {
     vec3 color;       // linear base colour: the albedo of a dielectric
@@ -12,7 +12,7 @@ struct TextureSample {
 
 uniform int seed;
 
-// A random number of 32 bits of a cell and a number `salt`: the words of both mixed as in murmur3 (A. Appleby).
+// A 32-bit random number from a cell and a number `salt`, whose words are mixed as in murmur3 (A. Appleby).
 uint random_bits(ivec2 cell, int salt) {
     uint h = uint(cell.x) * 0x9e3779b1u ^ uint(cell.y) * 0x85ebca77u ^ uint(salt + 7919 * seed) * 0xc2b2ae3du;
     h = (h ^ (h >> 16u)) * 0x85ebca6bu;
@@ -20,13 +20,13 @@ uint random_bits(ivec2 cell, int salt) {
     return h ^ (h >> 16u);
 }
 
-// Three random numbers from 0 to 1 of a cell and a number `salt`.
+// Three random numbers from 0 to 1, from a cell and a number `salt`.
 vec3 random3(ivec2 cell, int salt) {
     uint h = random_bits(cell, salt);
     return vec3(h & 0xffffu, h >> 16u, (h * 0x9e3779b1u) >> 16u) / 65536.0;
 }
 
-// A cell in the tile, whose `period` counts its cells, for a `cell` that may lie outside.
+// The cell in the tile for a `cell` that may lie outside; `period` is the number of cells along each side of the tile.
 ivec2 wrapped(ivec2 cell, ivec2 period) {
     return ivec2(cell.x - period.x * int(floor(float(cell.x) / float(period.x))),
                  cell.y - period.y * int(floor(float(cell.y) / float(period.y))));
@@ -47,8 +47,8 @@ float gradient_noise(vec2 p, ivec2 period, int salt) {
     return 1.8 * mix(mix(corners[0], corners[1], fade.x), mix(corners[2], corners[3], fade.x), fade.y);
 }
 
-// The sum of octaves of gradient noise, about -1 to 1: `cells` of the first along u and v, each further one of twice as
-// many and `gain` times the height. Another `salt` gives another pattern.
+// The sum of octaves of gradient noise, about -1 to 1: `cells` of the first along u and v; each further octave has
+// twice as many cells and `gain` times the height. Another `salt` gives another pattern.
 float fractal_noise(vec2 uv, ivec2 cells, int octaves, float gain, int salt) {
     float sum = 0.0, weight = 1.0, total = 0.0;
     for (int i = 0; i < octaves; ++i) {
@@ -67,8 +67,8 @@ struct CellularNoise {
     vec2 offset;    // from that point, in cells
 };
 
-// Where a point is in relation to random ones, of which there is one in each of `cells`. `spread` 0 puts them on a
-// grid, another `salt` elsewhere (S. Worley, "A Cellular Texture Basis Function", 1996).
+// The position of a point relative to random points, one in each of `cells`. A `spread` of 0 puts them on a grid,
+// another `salt` elsewhere (S. Worley, "A Cellular Texture Basis Function", 1996).
 CellularNoise cellular_noise(vec2 uv, ivec2 cells, float spread, int salt) {
     vec2 p = uv * vec2(cells);
     ivec2 home = ivec2(floor(p));
@@ -101,7 +101,7 @@ float cellular_edge(CellularNoise found, vec2 uv, ivec2 cells, float spread, int
     return edge;
 }
 
-// A `color` made lighter or darker by the factor `exp2(by)`, and within what albedo can be.
+// A `color` made lighter or darker by the factor `exp2(by)`, and kept within the range of albedos.
 vec3 shaded(vec3 color, float by) {
     return clamp(color * exp2(by), 0.0, 0.95);
 }

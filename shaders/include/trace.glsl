@@ -1,4 +1,5 @@
-// Rays against the scene. The step reads an input of `SceneData` with `rays=True`. The trees follow what moves.
+// Ray tracing in the scene. The step reads an input of `SceneData` with `rays=True`. The trees follow objects that
+// move.
 #include <scene.glsl>
 #include <trace_tree.glsl>
 
@@ -11,7 +12,7 @@ bool trace_is_cut_away(Hit hit) {
 #endif
 
 // The nearest surface along a ray between two distances in lengths of the direction. It finds transparent surfaces,
-// too, but not what an alpha mask cuts away, and no hidden objects.
+// too, but neither parts that an alpha mask cuts away nor hidden objects.
 bool nearest_hit(vec3 origin, vec3 direction, float nearest, float farthest, out Hit hit) {
 #ifdef SCENE_ANY_MASKED
     RayQuery query = ray_query(origin, direction, nearest, farthest, 0, 0, SCENE_MASKED, false);
@@ -25,7 +26,7 @@ bool nearest_hit(vec3 origin, vec3 direction, float nearest, float farthest, out
 #endif
 }
 
-// The same for a ray of the camera: what geometry passes draw, so nothing that shows its back and has one side.
+// The same for a camera ray: it hits what geometry passes draw, so no back faces of one-sided materials.
 bool visible_hit(vec3 origin, vec3 direction, float nearest, float farthest, out Hit hit) {
     bool is_hit = nearest_hit(origin, direction, nearest, farthest, hit);
     while (is_hit && !scene_has(hit.instance, SCENE_DOUBLE_SIDED)
@@ -35,7 +36,7 @@ bool visible_hit(vec3 origin, vec3 direction, float nearest, float farthest, out
     return is_hit;
 }
 
-// Whether anything of these flags lies between two distances. Transparent surfaces do not count.
+// Whether anything with all flags in `wanted` lies between two distances. Transparent surfaces do not count.
 bool any_hit(vec3 origin, vec3 direction, float nearest, float farthest, int wanted) {
     const int PASSING = SCENE_BLENDED | SCENE_TRANSMITS;
 #ifdef SCENE_ANY_MASKED
@@ -50,8 +51,8 @@ bool any_hit(vec3 origin, vec3 direction, float nearest, float farthest, int wan
 #endif
 }
 
-// Whether something casts a shadow from one end to the other: no transparent surfaces, nothing that an alpha mask cuts
-// away, and only objects that cast shadows.
+// Whether anything casts a shadow between two distances. Transparent surfaces, parts that an alpha mask cuts away, and
+// objects that cast no shadows do not count.
 bool any_hit(vec3 origin, vec3 direction, float nearest, float farthest) {
     return any_hit(origin, direction, nearest, farthest, SCENE_CASTS_SHADOW);
 }

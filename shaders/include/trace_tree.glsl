@@ -1,4 +1,4 @@
-// Rays through the trees over objects and triangles. `trace.glsl` has the questions that are asked of them.
+// Traversal of the trees over objects and triangles. `trace.glsl` has the queries for shaders to call.
 #include <ray_query.glsl>
 
 // The axes in an order that ends with `last`, without mirroring.
@@ -10,10 +10,10 @@ vec3 trace_permuted(vec3 v, int last) {
 // that of S. Woop, C. Benthin and I. Wald ("Watertight Ray/Triangle Intersection", 2013): no ray passes between two
 // triangles that share an edge.
 //
-// Each turn of the inner loop visits two nodes and tests a triangle, and invocations leave it only when nothing is left
-// of the tree. Those that a processor runs in lockstep then do the same work most of the time, and the set of those
-// that are active seldom changes, which llvmpipe's branches can predict. The stack cannot overflow: depths of trees are
-// limited when they are built, and TRACE_STACK follows from the limits.
+// Each iteration of the inner loop visits two nodes and tests a triangle, and invocations leave it only at the end of
+// the tree. Those that run in lockstep then do the same work most of the time, and the set of active ones seldom
+// changes, so llvmpipe's branches are predictable. The stack cannot overflow: depths of trees are limited when they are
+// built, and TRACE_STACK follows from the limits.
 bool find_candidate(inout RayQuery q) {
     ivec4 header = SCENE_TREE(0), header2 = SCENE_TREE(1);
     vec3 top_origin = (q.origin - intBitsToFloat(header.xyz)) * intBitsToFloat(header2.xyz);
@@ -40,7 +40,7 @@ bool find_candidate(inout RayQuery q) {
             q.axis = size.x > size.y && size.x > size.z ? 0 : size.y > size.z ? 1 : 2;
             vec3 permuted = trace_permuted(d, q.axis);
             q.shear = vec3(permuted.xy, 1.0) / permuted.z;
-            q.flags = scale.w;  // below 0 for the shared tree, whose triangles have them
+            q.flags = scale.w;  // below 0 for the shared tree, whose triangles have the flags
             bool is_wanted = q.flags < 0 || ((q.flags & q.wanted) == q.wanted && (q.flags & q.rejected) == 0);
             int next = trace_stack[max(top - 1, 0)];
             bool is_last = next == TRACE_END;  // so there is no way back
@@ -83,7 +83,7 @@ bool find_candidate(inout RayQuery q) {
             bool is_leaf = node < 0 && q.in_mesh;
             int leaf = is_leaf ? -1 - node : 0, at = header2.w + 3 * (leaf >> 2);
             ivec4 first = SCENE_TREE(at), second = SCENE_TREE(at + 1), third = SCENE_TREE(at + 2);
-            // Triangles must compute the same numbers for a shared edge: no fused multiply-add may come in.
+            // Triangles must compute the same numbers for a shared edge: no fused multiply-add is allowed.
             precise vec3 p0 = trace_permuted(intBitsToFloat(first.xyz) - q.object_origin, q.axis);
             precise vec3 p1 = trace_permuted(intBitsToFloat(second.xyz) - q.object_origin, q.axis);
             precise vec3 p2 = trace_permuted(intBitsToFloat(third.xyz) - q.object_origin, q.axis);
@@ -119,8 +119,8 @@ bool find_candidate(inout RayQuery q) {
     return stops;
 }
 
-// The nearest hit between two distances, both exclusive, of what has all flags in `wanted` and none in `rejected`; with
-// `any` the first that is found.
+// The nearest hit between two distances, both exclusive, of surfaces with all flags in `wanted` and none in `rejected`;
+// with `any` the first hit found.
 bool trace(
     vec3 origin, vec3 direction, float nearest, float farthest, int wanted, int rejected, bool any, out Hit hit) {
     RayQuery q = ray_query(origin, direction, nearest, farthest, wanted, rejected, 0, any);

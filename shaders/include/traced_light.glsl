@@ -1,4 +1,4 @@
-// Light on surfaces that rays have met. The step reads an input of `SceneData` with `rays=True`.
+// Light on surfaces that rays have hit. The step reads an input of `SceneData` with `rays=True`.
 #include <lights.glsl>
 #include <luminance.glsl>
 #include <passing_light.glsl>
@@ -6,8 +6,9 @@
 #include <trace.glsl>
 
 // The surface that stops light along a ray, up to a distance in metres; false if there is none. Transparent surfaces
-// stop it with a chance of their opacity, and transmissive ones pass it straight on by chance. `throughput` is
-// multiplied by what they leave, over the chance. `pixel` and `seed` decide by which random number.
+// stop it with the probability of their opacity, and transmissive ones let it pass straight through at random.
+// `throughput` is multiplied by the fraction of light that passes, over the probability. `pixel` and `seed` determine
+// the random numbers.
 bool stopping_surface(
     vec3 origin, vec3 direction, float farthest, ivec2 pixel, int seed, inout vec3 throughput, out Hit hit,
     out Surface s) {
@@ -38,16 +39,16 @@ bool stopping_surface(
     return is_hit;
 }
 
-// Radiance that a surface of the scene emits towards `s.view_dir`. Backs of materials with one side emit none.
+// Radiance that a surface of the scene emits towards `s.view_dir`. Back faces of one-sided materials emit none.
 vec3 emitted_radiance(Hit hit, Surface s) {
     bool is_front = dot(scene_geometric_normal(hit.instance, hit.triangle), s.view_dir) >= 0.0;
     bool emits = is_front || scene_has(hit.instance, SCENE_DOUBLE_SIDED);
     return s.lit == 0.0 ? s.base_color : emits ? s.emissive : vec3(0.0);
 }
 
-// Irradiance in lux, on a surface that faces the light, from one of the lights, over the chance that it was chosen. Its
-// chance is its share of the irradiance of `s` without shadows. `origin` is where the shadow ray leaves, `xi` a random
-// number from 0 to 1; `light_dir` is the unit vector to the light. 0 if the light is in shadow, or there is none.
+// Irradiance in lux, on a surface that faces the light, from one of the lights, over the probability of choosing it:
+// its share of the irradiance of `s` without shadows. `origin` is where the shadow ray begins, `xi` a random number
+// from 0 to 1; `light_dir` is the unit vector to the light. 0 if the light is in shadow, or there is none.
 vec3 irradiance_from_one_light(Surface s, vec3 origin, float xi, out vec3 light_dir) {
     light_dir = s.normal;
 #if LIGHT_COUNT > 0

@@ -55,7 +55,8 @@ vec4 world_to_clip(vec3 position) {
     return PASS_VIEW.view_projection * vec4(position, 1.0);
 }
 
-// Object-space position of the vertex in the previous frame: another one than now where skins or morph targets move it.
+// Object-space position of the vertex in the previous frame; it differs from the current one if skins or morph targets
+// move it.
 vec3 previous_vertex_position() {
 #if defined(WRITES_VELOCITY) && defined(SCENE_POSED)
     return in_previous_position;
@@ -75,7 +76,7 @@ vec3 previous_object_to_world(vec3 p) {
 }
 
 // Writes the clip-space positions in this frame and the previous one, for `fragment_velocity()`. `position` and
-// `previous_position` are where the vertex is and was in world space; a vertex shader that moves vertices calls it so.
+// `previous_position` are where the vertex is and was in world space; vertex shaders that move vertices call this form.
 void write_velocity_varyings(vec3 position, vec3 previous_position) {
 #ifdef WRITES_VELOCITY
     v_clip_position = world_to_clip(position);
@@ -83,7 +84,7 @@ void write_velocity_varyings(vec3 position, vec3 previous_position) {
 #endif
 }
 
-// The same of a vertex that moves with its object alone.
+// The same for a vertex that only moves with its object.
 void write_velocity_varyings() {
     write_velocity_varyings(object_to_world(in_position), previous_object_to_world(previous_vertex_position()));
 }

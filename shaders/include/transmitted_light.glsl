@@ -1,6 +1,6 @@
-// Light that passes through a surface (KHR_materials_transmission, volume and dispersion), seen in screen space: a copy
-// of the picture of what is opaque, `behind`, is read where the refracted ray leaves the volume. Its levels blur it as
-// a rough surface does. What other transmissive surfaces show is not in it, nor what is outside of the picture.
+// Light that passes through a surface (KHR_materials_transmission, volume and dispersion), in screen space: a copy of
+// the picture of opaque surfaces, `behind`, is read where the refracted ray leaves the volume. Its mip levels blur it
+// as a rough surface does. It contains neither other transmissive surfaces nor anything outside the picture.
 #include <environment_lighting.glsl>
 #include <math.glsl>
 #include <pass_view.glsl>
@@ -37,7 +37,7 @@ vec4 refracted_light(Surface s, float ior) {
     return blurred_picture(clip.xy / clip.w * 0.5 + 0.5, log2(PASS_VIEW.viewport.x) * roughness);
 }
 
-// What the surface leaves of light that passes through it.
+// Fraction of light that passes through the surface.
 vec3 transmittance(Surface s) {
     vec3 reflected = specular_reflectance(s);
     vec3 left = exp(-s.absorption * s.thickness) * s.base_color * s.transmission * (1.0 - min(reflected, 1.0));
@@ -64,7 +64,7 @@ vec3 transmitted_light(Surface s) {
     return light * transmittance(s);
 }
 
-// How much of what is behind everything the surface hides, with what is seen through it.
+// How much of the background the surface hides, together with what is seen through it.
 float transmitted_coverage(Surface s) {
     vec3 left = transmittance(s);
     return 1.0 - (left.r + left.g + left.b) / 3.0 * (1.0 - refracted_light(s, s.ior).a);

@@ -9,7 +9,7 @@ vec2 velocity_between(vec4 clip_position, View view, vec4 previous_clip_position
     return position - (0.5 * previous_clip_position.xy / previous_clip_position.w - previous_view.jitter.xy);
 }
 
-// The same of a static point at a window position and depth. The background is infinitely far away.
+// The same for a static point at a window position and depth. The background is infinitely far away.
 vec2 static_velocity(View view, View previous_view, vec2 uv, float depth) {
     vec4 clip_position = vec4(uv * 2.0 - 1.0, depth, 1.0);
     vec3 position = world_position(view, uv, depth);

@@ -34,8 +34,8 @@ vec3 view_space_position(View v, vec2 uv, float depth) {
     return p.xyz / p.w;
 }
 
-// World-space position, in metres, of a window position and depth. It goes through view space, where numbers near the
-// eye are small, so that float32 loses less than with the combined inverse matrix.
+// World-space position, in metres, of a window position and depth. The computation goes through view space, where
+// numbers near the eye are small, so that float32 loses less than with the combined inverse matrix.
 vec3 world_position(View v, vec2 uv, float depth) {
     return (v.inverse_view * vec4(view_space_position(v, uv, depth), 1.0)).xyz;
 }

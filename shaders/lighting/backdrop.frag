@@ -1,5 +1,5 @@
-// What lies behind all surfaces: the environment, or without one the background, with the air in front of it. Blending
-// shows it where the picture is not covered.
+// The backdrop behind all surfaces: the environment, or the background if there is none, with the air in front of it.
+// Blending shows it where the picture is not covered.
 #include <pass_view.glsl>
 #include <air.glsl>
 

@@ -1,5 +1,5 @@
-// Shadow catchers in lighting nodes: the surface that they are lit as, and what becomes of the outputs. Where the
-// environment is not the background, a catcher darkens the constant background, and its alpha is how dark it is.
+// Shadow catchers in lighting nodes: the surface as which they are lit, and their outputs. Where the environment is not
+// the background, a catcher darkens the constant background, and its alpha is how dark it is.
 #ifdef HAS_SHADOW_CATCHER
 #include <luminance.glsl>
 #include <shadow_catcher.glsl>
@@ -22,9 +22,9 @@ uniform vec3 background;
 uniform sampler2D mirrored;
 uniform sampler2D mirrored_depth;
 
-// What the ground mirrors at a point of it, and in alpha how much of that are objects. The farther away the objects,
-// the more of the picture lies in the cone of directions that a rough ground reflects: that many texels a level has
-// blurred. How far they are is the mean over a ring, so that silhouettes are as soft outside as inside.
+// The reflection in the ground at a surface point; alpha is the share of objects in it. The cone of directions that a
+// rough ground reflects covers more of the picture the farther away the objects are, and the mip level blurs as many
+// texels. Their distance is the mean over a ring, so that silhouettes are as soft outside as inside.
 vec4 mirrored_at(Surface s) {
     View v = mirrored_views[0];
     vec4 clip = v.view_projection * vec4(s.position, 1.0);
@@ -44,7 +44,7 @@ vec4 mirrored_at(Surface s) {
 }
 #endif
 
-// `unshadowed` is the light that it receives where nothing shadows it, as radiance of a white surface.
+// `unshadowed` is the light that the catcher receives without shadows, as radiance of a white surface.
 void begin_catcher(inout Surface s, vec3 unshadowed) {
     vec3 shown = vec3(1.0);
 #ifdef SHOWS_ENVIRONMENT
@@ -67,7 +67,7 @@ void end_catcher(Surface s, float coverage) {
     diffuse = vec4(background * diffuse.rgb, radiance.a);
 #endif
 #elif defined(HAS_REFLECTIONS) || defined(MIRRORS)
-    // What is reflected instead of the environment, whose reflection is in what the catcher shows.
+    // Reflections that replace the environment's, which is already part of what the catcher shows.
 #ifdef HAS_REFLECTIONS
     vec4 reflected = reflections_at_fragment();
     reflected.rgb *= reflected.a;

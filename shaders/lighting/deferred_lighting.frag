@@ -12,7 +12,7 @@ uniform sampler2D edges;  // 1 where samples differ: sample 0 is shaded there, a
 #endif
 
 #ifdef WRITES_SHADOW_DIFFERENCE
-// The sample that lies closest to the point opposite of a sample, with respect to the pixel's centre.
+// The sample closest to the point opposite a sample, with respect to the pixel's centre.
 int opposite_sample(int sample_index) {
     vec2 opposite = 1.0 - DEPTH_SAMPLE_POSITIONS[sample_index];
     int nearest = 0;

@@ -3,7 +3,7 @@
 #include <lighting.glsl>
 #include "light_outputs.glsl"
 
-uniform int light;  // the scene's index
+uniform int light;  // index in the scene
 
 void main() {
     Surface s;

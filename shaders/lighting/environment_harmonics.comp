@@ -50,8 +50,8 @@ void main() {
     // Band factors of irradiance / π: a cosine lobe has π, 2π / 3 and π / 4.
     float band1 = 2.0 / 3.0, band2 = 0.25;
 #if WINDOW
-    // Opposite of a strong light, nine harmonics become negative. The higher bands are damped by a power of their
-    // degree (Sloan 2017) until the irradiance is positive in all of 256 directions.
+    // Opposite a strong light, nine harmonics become negative. The higher bands are damped by a power of their degree
+    // (Sloan 2017) until the irradiance is positive in all of 256 directions.
     float phi = 2.399963 * float(gl_LocalInvocationIndex), z = 1.0 - (float(gl_LocalInvocationIndex) + 0.5) / 128.0;
     vec3 d = vec3(sqrt(1.0 - z * z) * vec2(cos(phi), sin(phi)), z);
     vec3 irradiance0 = 0.282095 * sums[0];

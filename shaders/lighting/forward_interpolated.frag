@@ -1,4 +1,4 @@
-// Forward lighting with light from the vertices or the face. Textures and shadows are evaluated per fragment.
+// Forward lighting with light computed per vertex or per face. Textures and shadows are evaluated per fragment.
 #define NO_LAYERS
 #include <pass_view.glsl>
 #include <fragment_surface.glsl>

@@ -6,7 +6,7 @@
 #include "caught_light.glsl"
 
 #ifndef FIRST_PASS
-uniform int light;  // the scene's index
+uniform int light;  // index in the scene
 #endif
 
 void main() {

@@ -44,7 +44,7 @@ void set_parts(vec4 value) {
 #endif
 }
 
-// Outputs where no surface is.
+// Outputs where there is no surface.
 void write_background(vec4 background) {
     set_parts(vec4(0.0));
     radiance = background;
@@ -104,7 +104,7 @@ void write_light(Surface s, ReflectedLight direct, ReflectedLight environment) {
 #if defined(TRANSPARENT) && defined(TRANSMISSION_LAYER)
     radiance.a *= transmitted_coverage(s);
 #endif
-    // What is transparent dims the albedo of the opaque surface behind it, and leaves its other factors as they are.
+    // A transparent surface dims the albedo of the opaque surface behind it, and leaves its other factors as they are.
 #ifdef WRITES_ENVIRONMENT_REFLECTION
     environment_reflection = vec4(min(occluded_reflection(s), MAX_HALF_FLOAT), 1.0);
 #endif

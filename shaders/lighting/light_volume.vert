@@ -4,7 +4,7 @@
 #include <lights.glsl>
 #include <math.glsl>
 
-uniform int light;  // the scene's index
+uniform int light;  // index in the scene
 
 // The light's range; without one, the distance to the farthest corner of the view frustum.
 float volume_radius(Light l) {

@@ -1,7 +1,7 @@
 // Screen-space reflections: rays that step over the depth buffer, evenly on the screen (M. McGuire and M. Mara,
 // "Efficient GPU Screen-Space Ray Tracing", 2014), and a picture that is blurred by a cone (Y. Uludag, "Hi-Z
-// Screen-Space Cone-Traced Reflections", 2014). It writes by how much the picture changes where what is found takes the
-// place of the environment's reflection.
+// Screen-Space Cone-Traced Reflections", 2014). It writes the change of the picture where the reflection found replaces
+// that of the environment.
 #include <depth_surface.glsl>
 #include <frame.glsl>
 #include <math.glsl>
@@ -70,7 +70,7 @@ void main() {
         else before = t;
     }
     if (hit < 0.0) return;
-    for (int i = 0; i < 6; ++i) {  // the place where it passes behind
+    for (int i = 0; i < 6; ++i) {  // bisects for the point where the ray passes behind the surface
         float middle = 0.5 * (before + hit);
         vec3 at = mix(from, to, middle);
         bool is_behind = mix(first, last, middle) / at.z > scene_distance(v, at.xy);
@@ -79,7 +79,7 @@ void main() {
     }
     vec3 at = mix(from, to, hit);
     float found = scene_distance(v, at.xy);
-    if (mix(first, last, hit) / at.z - found > thickness) return;  // it passes behind something thin
+    if (mix(first, last, hit) / at.z - found > thickness) return;  // the ray passes behind a thin surface
     ivec2 there = ivec2(at.xy * v.viewport.xy);
     vec3 met = view_space_position(v, at.xy, texelFetch(depth, there, 0).r);
     vec3 other = to_view * texelFetch(normal, there, 0).xyz;

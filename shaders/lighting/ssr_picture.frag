@@ -1,4 +1,4 @@
-// The picture that is reflected: without highlights of the lights, which an eye behind the mirror sees at other places.
+// The picture that is reflected, without highlights of the lights: an eye behind the mirror sees those at other places.
 uniform sampler2D radiance;
 #ifdef HAS_DIRECT_SPECULAR
 uniform sampler2D direct_specular;

@@ -1,4 +1,4 @@
-// Radiance in the specular lobe of the picture's surfaces, by rays in directions that the lobe reflects.
+// Radiance in the specular lobe of the picture's surfaces, from rays in directions of the lobe.
 #define SCENE_LAYERS
 #define PASSES_LIGHT
 #include <brdf.glsl>
@@ -18,13 +18,14 @@ uniform float max_roughness;
 uniform int first_sample;
 out vec4 traced;
 
-// The part of a surface's rays that are worth their cost.
+// Confidence in the reflections of a surface: 1 for smooth ones, falling to 0 at `max_roughness`.
 float confidence_at(float roughness) {
     if (max_roughness >= 1.0) return 1.0;
     return clamp(4.0 * (max_roughness - roughness) / max(max_roughness, 1e-6), 0.0, 1.0);
 }
 
-// Radiance that arrives at `origin` from a direction. Where nothing is met, the environment is blurred by `angle`.
+// Radiance that arrives at `origin` from a direction. If the ray hits nothing, it is that of the environment, blurred
+// by `angle`.
 vec3 arriving_radiance(vec3 origin, vec3 direction, float angle, ivec2 pixel, int seed) {
     Hit hit;
     Surface s;
@@ -94,7 +95,7 @@ void main() {
         vec3 h = sample_visible_normal(v, alpha, shifted_point(i, shift));
         vec3 l = reflect(-v, h), direction = frame * l;
         if (l.z <= 0.0 || dot(direction, s.geometric_normal) <= 0.0) continue;
-        // Smith's G2 / G1 with height correlation: what is left of the BRDF times the cosine over the density, with F.
+        // Height-correlated Smith G2 / G1: with F, all that remains of BRDF × cosine / density.
         float shadowing = length(vec3(alpha * l.xy, l.z));
         float weight = l.z * (v.z + masking) / (l.z * masking + v.z * shadowing);
         vec3 fresnel = fresnel_schlick(s.f0, s.f90, max(dot(v, h), 0.0));

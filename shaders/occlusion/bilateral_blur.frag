@@ -27,7 +27,7 @@ void main() {
 #endif
     int last_tap = kernel_radius >> 1 << 1;
     float quad_center = 0.5 - float(odd.x + odd.y);  // relative to the texel
-    float total_weight = 1e-3;  // the texel's own value, in case that no tap lies on its surface
+    float total_weight = 1e-3;  // the texel's own value, in case no tap lies on its surface
     float sum = total_weight * texelFetch(source, pixel, 0).r;
     for (int i = -last_tap; i <= last_tap; i += 2) {
         ivec2 sample_pixel = clamp(pixel + i * axis, ivec2(0), last);

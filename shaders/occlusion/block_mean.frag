@@ -18,7 +18,7 @@ void main() {
     }
     vec3 position = view_position(view, texel_uv(texel, size, screen_size), surface.w);
     float tolerance = 0.1 * radius + depth_error(view, surface.w);
-    float total_weight = 1e-3;  // the pixel's own value, in case that no neighbour lies on its surface
+    float total_weight = 1e-3;  // the pixel's own value, in case no neighbour lies on its surface
     Value sum = total_weight * fetch_texel(unfiltered, texel, size).VALUE_CHANNELS;
     for (int i = 0; i < 4; ++i) {
         ivec2 sample_texel = texel + 2 * ivec2(i & 1, i >> 1) - 1;

@@ -1,11 +1,11 @@
 // Occlusion by discs in space (M. Bunnell, "Dynamic Ambient Occlusion and Indirect Lighting", GPU Gems 2, 2005).
 #include <disc_form_factor.glsl>
 
-// The formula is not linear in area, so every disc is as large as if there were this many, and occlusion does not
-// depend on the number of samples.
+// The formula is not linear in area, so discs are always as large as if there were this many of them. Occlusion then
+// does not depend on the number of samples.
 const float OCCLUDING_DISCS = 2048.0;
 
-// The most that one direction occludes. Discs close to one another add up to more.
+// Maximum occlusion of one direction. Discs close to one another add up to more.
 const float MAX_DIRECTION_OCCLUSION = 2.0;
 
 // Occlusion by one disc at `offset`; 0 beyond the radius and below the tangent plane.
@@ -29,8 +29,8 @@ float sample_occlusion(
         ? occlusion_of_disc(view, offset, normal, max_distance, area / OCCLUDING_DISCS / cos_ray, abs(cos_emitter))
         : 0.0;
     if (cos_emitter < 0.0) {
-        // The sample faces away, so it belongs to the far side of a solid object, of which the near side is invisible.
-        // A disc that faces the pixel stands for that, where the ray behind the sample is closest to the pixel.
+        // The sample faces away, so it belongs to the far side of a solid object whose near side is invisible. A disc
+        // that faces the pixel replaces it, where the ray behind the sample is closest to the pixel.
         vec3 direction = normalize(ray);
         vec3 closest = offset + direction * clamp(-dot(offset, direction), 0.0, radius);
         occlusion = max(

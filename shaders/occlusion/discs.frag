@@ -22,14 +22,14 @@ uniform sampler2D diffuse;
 #ifdef BEYOND
 #include "beyond_views.glsl"
 #endif
-uniform float wider;  // the radius of light, as a multiple
+uniform float wider;  // radius of light, as a multiple of `radius`
 #else
 const float wider = 1.0;
 #endif
 out Value unfiltered;
 
-// Every disc is as large as if there were this many. Their size limits the light of single discs close to a surface,
-// which would glow otherwise.
+// Discs are always as large as if there were this many of them. Their size limits the light of single discs close to a
+// surface, which would glow otherwise.
 const float EMITTING_DISCS = 512.0;
 
 #ifdef BACK

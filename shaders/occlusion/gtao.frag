@@ -11,7 +11,7 @@
 uniform sampler2D surfaces;
 uniform ivec2 screen_size;
 uniform float radius;   // metres
-uniform float falloff;  // share of the radius over which surfaces occlude less and less
+uniform float falloff;  // share of the radius over which occluders fade out
 out Value unfiltered;
 
 // The cosine of the horizon angle along a direction, at least `cos_lowest`.

@@ -9,7 +9,7 @@ uniform sampler2D normal;
 #ifdef HAS_VELOCITY
 uniform sampler2D velocity;
 #endif
-uniform sampler2D previous_surfaces;  // as `surface_with_count` has them
+uniform sampler2D previous_surfaces;  // written by `surface_with_count`
 uniform int frames;
 uniform int frames_at_rest;
 uniform float tolerance;  // distance from the tangent plane, relative to the distance from the camera
@@ -53,7 +53,7 @@ Reprojection reproject(ivec2 texel, float window_depth, vec3 surface_normal) {
     vec2 previous_uv = uv - view.jitter.xy - motion + previous_depth_views[0].jitter.xy;
     vec2 previous_texel = previous_uv * view.viewport.xy - 0.5;
     Reprojection r;
-    r.first = ivec2(floor(previous_texel + 1e-3));  // static pixels fall on one texel, whatever the rounding
+    r.first = ivec2(floor(previous_texel + 1e-3));  // static pixels fall on one texel, regardless of rounding
     vec2 fraction = max(previous_texel - vec2(r.first), 0.0);
     r.total_weight = r.count = 0.0;
     for (int i = 0; i < 4; ++i) {
@@ -75,8 +75,8 @@ float frames_with_current(Reprojection r) {
     return 1.0 + (r.total_weight > 0.0 ? min(floor(r.count / r.total_weight + 0.5), max_count - 1.0) : 0.0);
 }
 
-// What the next frame compares its surfaces with: world-space normal times the number of frames in the mean, and the
-// distance along the view axis.
+// Data that the next frame compares its surfaces with: world-space normal times the number of frames in the mean, and
+// the distance along the view axis.
 vec4 surface_with_count(vec3 surface_normal, float count, float window_depth) {
     vec2 uv = gl_FragCoord.xy * depth_views[0].viewport.zw;
     return vec4(surface_normal * count, linear_depth(depth_views[0], uv, window_depth));

@@ -34,12 +34,12 @@ float horizon_integral(Slice s, float cos_horizon, float side) {
     return 0.5 * (s.cos_normal * sin_squared + side * s.sin_normal * sine_term);
 }
 
-// The same of a whole side, down to the tangent plane.
+// The integral of a whole side, down to the tangent plane.
 float side_integral(Slice s, float side) {
     return 0.5 * (s.full_integral + side * 0.5 * PI * s.sin_normal);
 }
 
-// The mean direction between two horizon angles, h1 < 0 < h2, as long as its integral.
+// The mean direction between two horizon angles, h1 < 0 < h2, with its integral as the length.
 vec3 bent_direction(Slice s, float h1, float h2) {
     float n = s.normal_angle;
     float t = 6.0 * (sin(h1 - n) + sin(h2 - n)) - sin(3.0 * h1 - n) - sin(3.0 * h2 - n) + 16.0 * sin(n)

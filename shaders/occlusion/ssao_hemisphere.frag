@@ -1,6 +1,6 @@
 // Screen-space ambient occlusion by points in the hemisphere above each surface, which are projected onto the picture.
 // Each ray has four points: one in the narrow hemisphere, three in the wide one. There are no branches besides the
-// loops: rasterisers that run many pixels at once would execute both sides, and more slowly.
+// loops: rasterisers that run many pixels at once would execute both sides, which is slower.
 #include "surfaces.glsl"
 #include "quad_mean.glsl"
 #if ANIMATED
@@ -102,7 +102,7 @@ void main() {
     float occlusion = 0.0;
     int count = origin.surface.w > nearest ? SAMPLES / 4 : 0;
     for (int i = 0; i < count; ++i) {
-        // The sum of the normal and a uniform unit vector is distributed by the cosine over the hemisphere.
+        // The sum of the normal and a uniform unit vector is cosine-distributed over the hemisphere.
         vec3 direction = origin.surface.xyz + reflect(directions[i], mirror_normal);
         direction *= inversesqrt(max(dot(direction, direction), 1e-12));
         float jitter = fract(random.w * 0.5 + 0.5 + float(i) * 0.618034);

@@ -10,7 +10,7 @@ uniform sampler2D surfaces;
 uniform sampler2D diffuse;
 uniform ivec2 screen_size;
 uniform float radius;     // of occlusion, in metres
-uniform float wider;      // the radius of light, as a multiple
+uniform float wider;      // radius of light, as a multiple of `radius`
 uniform float thickness;  // metres
 out vec4 unfiltered;
 

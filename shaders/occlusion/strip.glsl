@@ -1,4 +1,4 @@
-// The strip of a surface that a sample stands for: from half-way to the sample before to half-way to the one after, and
+// The strip of a surface that a sample stands for: from halfway to the previous sample to halfway to the next one, and
 // `thickness` deep (O. Therrien, Y. Levesque and G. Gilet, "Screen Space Indirect Lighting with Visibility Bitmask",
 // 2023).
 
@@ -18,9 +18,9 @@ ViewRays view_rays(View v, vec2 uv, vec2 radius_uv) {
     return ViewRays(vec3(0.0), vec3(0.0), start, change);
 }
 
-// Where the tangent plane of a sample meets the view ray at another fraction of the radius. Takes and returns an offset
-// from the pixel; returns the sample's own if the plane is nearly parallel to the ray, or the result farther from it
-// than the pixel is.
+// Where the tangent plane of a sample intersects the view ray at another fraction of the radius. Takes and returns an
+// offset from the pixel; returns the sample's own if the plane is nearly parallel to the ray, or the result farther
+// from it than the pixel is.
 vec3 extend_plane(ViewRays rays, float fraction, vec3 position, vec3 offset, vec3 normal) {
     vec3 origin = rays.origin + fraction * rays.origin_change - position;
     vec3 direction = rays.direction + fraction * rays.direction_change;

@@ -50,8 +50,8 @@ vec2 texel_uv(ivec2 texel, ivec2 size, ivec2 screen_size) {
     return (vec2(screen_texel(texel, size, screen_size)) + 0.5) / vec2(screen_size);
 }
 
-// The value of a texel, by way of its centre: Mesa's rasteriser looks up the number of mip levels for each
-// `texelFetch`, which takes half of its time.
+// The value of a texel, sampled at its centre: Mesa's rasteriser looks up the number of mip levels for each
+// `texelFetch`, which takes half of the time.
 vec4 fetch_texel(sampler2D source, ivec2 texel, ivec2 size) {
     return textureLod(source, (vec2(texel) + 0.5) / vec2(size), 0.0);
 }
@@ -79,8 +79,8 @@ vec3 view_space_view_dir(View v, vec3 position) {
     return v.projection[2][3] == 0.0 ? vec3(0.0, 0.0, 1.0) : -normalize(position);
 }
 
-// The error of a distance in metres that two float32 steps of window depth make: a share of the distance, or of the
-// depth range for orthographic views.
+// The error of a distance, in metres, that corresponds to two float32 steps of window depth: a share of the distance,
+// or of the depth range for orthographic views.
 float depth_error(View v, float distance) {
     return 2.4e-7 * (v.projection[2][3] == 0.0 ? v.range.y - v.range.x : distance);
 }

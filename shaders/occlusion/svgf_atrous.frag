@@ -1,6 +1,6 @@
 // One pass of the variance-guided à-trous filter: 5×5 texels that are `stride` apart, weighted by a B-spline, by plane
 // and normal, and by the difference of luminance over its standard deviation (Schied et al. 2017). The distance from
-// the tangent plane stands for the depth gradient of the original.
+// the tangent plane replaces the depth gradient of the original.
 #include "surfaces.glsl"
 #include "svgf_albedo.glsl"
 #include <luminance.glsl>
@@ -20,7 +20,7 @@ out vec4 filtered;
 
 const float KERNEL[3] = float[](0.375, 0.25, 0.0625);
 
-// Variance around a texel, by a Gaussian of 3×3 texels: that of one texel is itself noisy.
+// Variance around a texel, by a Gaussian of 3×3 texels: the variance of one texel is itself noisy.
 float smooth_variance(ivec2 texel, ivec2 size) {
     float sum = 0.0;
     for (int i = 0; i < 9; ++i) {

@@ -29,7 +29,7 @@ vec3 current_light(ivec2 texel) {
     vec3 light = texelFetch(radiance, texel, 0).rgb;
     source = vec4(light, 0.0);
 #ifdef HAS_SAMPLES_TAKEN
-    // The source is the mean of all samples since something has changed.
+    // The source is the mean of all samples since the last change.
     source.w = texelFetch(samples_taken, texel, 0).r;
     vec4 before = texelFetch(previous_source, texel, 0);
     if (still_frames > 0 && before.w > 0.0 && source.w > before.w) {

@@ -12,7 +12,7 @@ out vec4 filtered;  // light over albedo; alpha is the variance of its luminance
 out float variance;
 #endif
 
-const float OWN_FRAMES = 8.0;  // from as many on, a pixel's own moments suffice
+const float OWN_FRAMES = 8.0;  // from this many frames on, a pixel's own moments suffice
 
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);

@@ -1,10 +1,10 @@
-// Diffuse light from other surfaces, by rays. Each ray that meets a surface within the radius brings the diffuse light
-// that leaves it: emission, light of the lights, and light of the sky and of further bounces.
+// Diffuse light from other surfaces, by ray tracing. A ray that hits a surface within the radius receives the diffuse
+// light that leaves it: emission, and reflected light of the lights, the sky and further bounces.
 #define SCENE_LAYERS
 #define PASSES_LIGHT
 #define DIFFUSE_LOBE 0
 #define DIFFUSE_LOBE_SHARED 1
-#undef SCENE_ANY_SHEEN  // darkens what is below it by a few percent, and would need a table
+#undef SCENE_ANY_SHEEN  // sheen darkens the layers below by a few percent, and would need a table
 #include <depth_surface.glsl>
 #include <frame.glsl>
 #include <layers.glsl>
@@ -46,9 +46,9 @@ bool is_shown(Surface s, out vec3 light) {
 }
 #endif
 
-const float SKY_ANGLE = 0.02;  // radians that the environment is blurred by, so that a small sun makes less noise
+const float SKY_ANGLE = 0.02;  // radians by which the environment is blurred, so that a small sun causes less noise
 
-// Radiance that arrives along a ray which meets nothing.
+// Radiance that arrives along a ray that hits nothing.
 vec3 sky_radiance(vec3 direction) {
 #ifdef HAS_MAP
     return equirectangular_radiance(map, world_to_environment(direction), SKY_ANGLE) * environment_transform.z;
@@ -65,7 +65,7 @@ bool has_sky() {
 #endif
 }
 
-// What a coat leaves of diffuse light from this direction, and to the viewer.
+// Fraction of diffuse light, from this direction and to the viewer, that passes through the coat.
 float below_coat(Surface s, vec3 light_dir) {
 #ifdef CLEARCOAT_LAYER
     return below_clearcoat(s, light_dir);
@@ -74,11 +74,12 @@ float below_coat(Surface s, vec3 light_dir) {
 #endif
 }
 
-// Diffuse radiance that arrives along a ray from a surface. w is 1 if it meets nothing within the radius of occlusion.
+// Diffuse radiance that arrives along a ray from a surface. w is 1 if the ray hits nothing within the radius of
+// occlusion.
 vec4 arriving_light(vec3 origin, vec3 direction, ivec2 pixel, int seed) {
     vec4 light = vec4(0.0);
     vec3 throughput = vec3(1.0);
-    bool is_sky_known = false;  // the light at the last surface already has that of the sky
+    bool is_sky_known = false;  // the light at the last surface already includes the sky
 #ifdef WIDER
     float farthest = radius * wider;
 #else
@@ -89,7 +90,7 @@ vec4 arriving_light(vec3 origin, vec3 direction, ivec2 pixel, int seed) {
         Surface s;
         ++seed;
         if (!stopping_surface(origin, direction, farthest, pixel, seed, throughput, hit, s)) {
-            // The sky that the pixel itself sees is the light of the lighting node.
+            // The lighting node already adds the sky that the pixel itself sees.
             if (bounce == 1) light.w = 1.0;
             else if (!is_sky_known) light.rgb += throughput * sky_radiance(direction);
             break;
@@ -130,10 +131,10 @@ void main() {
     }
     vec3 axis = normalize(texelFetch(normal, texel, 0).xyz);
     vec3 geometric_normal = geometric_normal_at(texel, TEXEL_CENTER, position, window_depth);
-    // At outlines the differences of depth are those of two surfaces.
+    // At outlines, differences of depth are between two surfaces.
     if (dot(geometric_normal, axis) < 0.25) geometric_normal = axis;
     float distance = linear_depth(depth_views[0], window_depth);
-    vec3 leaving = geometric_normal + view_dir(depth_views[0], position);  // the latter out of creases
+    vec3 leaving = geometric_normal + view_dir(depth_views[0], position);  // the view direction leads out of creases
     vec3 origin = position + leaving * max(ray_offset(position, distance), snapped_by(distance));
     int frame = ANIMATED * frame_index;
     vec2 shift = random_shift(pixel, frame);

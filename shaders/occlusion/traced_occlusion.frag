@@ -1,4 +1,4 @@
-// Ambient visibility by cosine-weighted rays: the part of them that meets nothing within the radius.
+// Ambient visibility: the fraction of cosine-weighted rays that hit nothing within the radius.
 #include <depth_surface.glsl>
 #include <frame.glsl>
 #include <ray_directions.glsl>
@@ -39,10 +39,10 @@ void main() {
 #else
     vec3 axis = normalize(texelFetch(normal, texel, 0).xyz);
     vec3 geometric_normal = geometric_normal_at(texel, TEXEL_CENTER, position, window_depth);
-    // At outlines the differences of depth are those of two surfaces.
+    // At outlines, differences of depth are between two surfaces.
     if (dot(geometric_normal, axis) < 0.25) geometric_normal = axis;
     float distance = linear_depth(depth_views[0], window_depth);
-    vec3 leaving = geometric_normal + view_dir(depth_views[0], position);  // the latter out of creases
+    vec3 leaving = geometric_normal + view_dir(depth_views[0], position);  // the view direction leads out of creases
     vec3 origin = position + leaving * max(ray_offset(position, distance), snapped_by(distance));
     vec2 shift = random_shift(pixel, ANIMATED * frame_index);
     for (int i = FIRST_RAY; i < PAST_RAY; ++i) {

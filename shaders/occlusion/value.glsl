@@ -1,5 +1,5 @@
-// The type of what occlusion passes compute and filter: ambient visibility (1 open, 0 closed), or with HAS_VECTOR a
-// vec4 with visibility in w, and in xyz indirect light or the direction of the bent normal.
+// The type of the values that occlusion passes compute and filter: ambient visibility (1 open, 0 closed), or with
+// HAS_VECTOR a vec4 with visibility in w, and in xyz indirect light or the direction of the bent normal.
 #ifdef HAS_VECTOR
 #define Value vec4
 #define VALUE_CHANNELS rgba

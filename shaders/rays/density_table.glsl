@@ -1,8 +1,8 @@
 // Sampling of texels in proportion to their values (M. McCool and P. Harwood, "Probability Trees", 1997): a point of
-// the unit square is warped level by level. `density_tree.frag` makes the tree from the mips of the table: a texel of a
-// level holds the four values below it. Mips are read only in uniform control flow, where drivers agree on them.
+// the unit square is warped level by level. `density_tree.frag` builds the tree from the mips of the table: a texel of
+// a level holds the four values below it. Mips are read only in uniform control flow, where drivers agree on them.
 
-// Where the tree has the first texel of a level, from 1, over a table of this size.
+// The first texel of a level, from 1, in the tree over a table of this size.
 ivec2 tree_origin(ivec2 size, int level) {
     return level == 1 ? ivec2(0) : ivec2(max(size.x / 2, 1), size.y / 2 - (size.y >> (level - 1)));
 }
@@ -12,7 +12,7 @@ int tree_levels(ivec2 size) {
     return findMSB(max(size.x, size.y));
 }
 
-// The texel of the table that a point falls into; `xi` becomes the place inside of it.
+// The texel of the table that a point falls into; `xi` becomes the position within it.
 ivec2 sample_texel(sampler2D tree, ivec2 size, inout vec2 xi) {
     ivec2 cell = ivec2(0);
     for (int level = tree_levels(size); level >= 1; --level) {

@@ -16,7 +16,7 @@ void main() {
             texelFetch(table, ivec2(last.x, first.y), level - 1)[channel],
             texelFetch(table, ivec2(first.x, last.y), level - 1)[channel],
             texelFetch(table, last, level - 1)[channel]);
-        // A side of one texel has nothing on the right, or above.
+        // A side of one texel has no texel on the right, or above.
         if (below.x == 1) found.yw = vec2(0.0);
         if (below.y == 1) found.zw = vec2(0.0);
         bool is_inside = all(greaterThanEqual(cell, ivec2(0))) && all(lessThan(cell, sides));

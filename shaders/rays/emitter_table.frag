@@ -1,5 +1,5 @@
-// Power of each emitting triangle, to choose it by, up to a common factor: area times the luminance of its emission
-// without texture. In front of it the triangle's centre times this.
+// The power of each emitting triangle in w, for choosing one, up to a common factor: area times the luminance of its
+// emission without texture. xyz hold the triangle's centre times this power.
 #include <luminance.glsl>
 #include <scene.glsl>
 out vec4 emitter_table;

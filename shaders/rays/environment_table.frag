@@ -1,4 +1,4 @@
-// Luminance of the environment times the solid angle of a texel, to choose directions by. rendergraph provides
+// Luminance of the environment times the solid angle of a texel, for choosing directions. rendergraph provides
 // `light_from()`.
 #include <luminance.glsl>
 #include "environment_directions.glsl"

@@ -1,4 +1,4 @@
-// The surface that a pixel's centre shows.
+// The surface visible at a pixel's centre.
 #include <trace.glsl>
 #include "camera_ray.glsl"
 #ifdef WRITES_ALBEDO

@@ -1,9 +1,9 @@
-// A point beside a surface, so that a ray which leaves there does not hit the surface again: positions are moved along
+// Moves the origin of a ray off a surface, so that the ray does not hit the surface again: positions are moved along
 // the normal by a number of steps of their own precision (C. Wächter and N. Binder, "A Fast and Robust Method for
 // Avoiding Self-Intersection", Ray Tracing Gems, 2019). Small coordinates beside large ones are as imprecise as those,
 // because rays are sheared, and all are as imprecise as those of the object's corners that they are interpolated from:
-// these take the place of the constant of the article, which is right for scenes of some metres alone. `normal` points
-// to the side that the ray leaves to.
+// these replace the constant of the article, which only suits scenes of some metres. `normal` points to the side to
+// which the ray leaves.
 vec3 offset_ray(int instance, vec3 position, vec3 normal) {
     const float INT_SCALE = 256.0, FAR_SCALE = 1.0 / 1048576.0, CORNER_SCALE = 1.0 / 4194304.0;
     ivec3 steps = ivec3(INT_SCALE * normal);

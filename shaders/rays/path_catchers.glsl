@@ -1,17 +1,17 @@
-// Shadow catchers of paths. What a catcher shows where nothing shadows it is known: paths collect only the difference
-// that surfaces make to it, so that the picture is without noise where there is none (P. Debevec, "Rendering Synthetic
-// Objects into Real Scenes", 1998). Without catchers nothing of this is compiled.
+// Shadow catchers in path tracing. The appearance of a catcher without shadows is known, so paths collect only the
+// difference that surfaces make to it. The picture then has no noise where there is no difference (P. Debevec,
+// "Rendering Synthetic Objects into Real Scenes", 1998). Without catchers none of this is compiled.
 struct CaughtPath {
-    bool leaves;    // the vertex before is on a catcher
-    bool is_plain;  // that of the camera is, and darkens the plain background
+    bool leaves;    // the previous vertex is on a catcher
+    bool is_plain;  // the camera sees the catcher, and it darkens the plain background
 };
 
 #if defined(SCENE_ANY_SHADOW_CATCHER) && SOURCES == SOURCES_ALL && !defined(NEEDS_NOTHING)
 #include <shadow_catcher.glsl>
 
-// Makes a surface a catcher and returns what it shows without shadows; false if it is none. To the camera it shows what
-// the background does, or white with `is_plain`, if that is not the environment. To other surfaces without an
-// environment it is a surface like others.
+// Makes a surface a catcher and returns in `shown` what it shows without shadows; false if it is not a catcher. To the
+// camera it shows the background, or white, with `is_plain`, if the background is not the environment. To other
+// surfaces, without an environment, it is an ordinary surface.
 bool catches_path(inout Surface s, int instance, bool is_camera, out bool is_plain, out vec3 shown) {
     is_plain = false;
     shown = vec3(1.0);
@@ -40,8 +40,8 @@ vec3 behind_catcher(CaughtPath caught, vec3 behind) {
     return caught.leaves ? vec3(0.0) : behind;
 }
 
-// Light to add where a path from a catcher meets a surface, which takes light of the environment away, and where it
-// meets a catcher, which `s` then becomes.
+// Light to add where a path from a catcher hits a surface, which blocks light of the environment, and where it hits a
+// catcher, which `s` then becomes.
 vec3 meet_catcher(
     inout CaughtPath caught, inout Surface s, int instance, vec3 direction, int vertex, float density, float chance) {
     vec3 sum = vec3(0.0), shown;
@@ -69,7 +69,7 @@ Surface lit_catcher(CaughtPath caught, Surface s, bool by_lights) {
     return s;
 }
 
-// Part of the light of a source that is in what the surface shows.
+// Part of a source's light that is already in what the surface shows.
 float shown_already(CaughtPath caught, bool is_in_unshadowed) {
     return caught.leaves && is_in_unshadowed ? 1.0 : 0.0;
 }

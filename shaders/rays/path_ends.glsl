@@ -5,8 +5,8 @@ uniform vec3 ambient;
 uniform vec3 background;
 
 // Radiance from behind all surfaces, where the environment has the radiance `sky` and is chosen with `sky_density`.
-// Rays of the camera see the background. Others have found the environment by themselves, with a density, where it had
-// a chance to be chosen before.
+// Camera rays see the background. Other rays have reached the environment with `density`, while the last surface could
+// have chosen it as a source with probability `chance`.
 vec3 light_behind(vec3 sky, float sky_density, bool is_camera, float density, float chance) {
 #ifdef SHOWS_ENVIRONMENT
     if (is_camera) return sky;

@@ -1,4 +1,4 @@
-// What paths of light collect: the part of it that is wanted, and the light that a surface reflects.
+// The light that paths collect: which part of it is wanted, and what a surface reflects.
 #include <layered_light.glsl>
 #include <lights.glsl>
 #include <luminance.glsl>
@@ -77,7 +77,7 @@ vec3 reflected_part(Surface s, vec3 light_dir) {
 #endif
 }
 
-// One punctual light, chosen by the light of it that arrives here without shadows. `sum` is that of all lights.
+// One punctual light, chosen in proportion to its unshadowed light at the surface. `sum` is that of all lights.
 int choose_light(Surface s, float xi, out float chance, out float sum) {
     int light = -1;
     sum = 0.0;

@@ -1,4 +1,4 @@
-// The mean of all paths so far, and how far off it is expected to be.
+// The mean of all paths so far, and its estimated variance.
 uniform sampler2D mean;
 uniform sampler2D spread;
 #ifdef WRITES_RADIANCE
@@ -19,7 +19,7 @@ void main() {
     radiance = light;
 #endif
 #ifdef WRITES_VARIANCE
-    // One batch alone does not tell; then it is as large as the light itself.
+    // One batch gives no estimate; the deviation is then assumed to be as large as the light itself.
     variance = vec4(batches > 1.0 ? sums.rgb / (batches * (batches - 1.0)) : light.rgb * light.rgb, 1.0);
 #endif
 #ifdef WRITES_SAMPLES_TAKEN

@@ -18,7 +18,7 @@ uniform sampler2D emitter_tree;
 #endif
 
 #ifdef USES_ENVIRONMENT
-// Density of a direction in the choice by the table, in 1/sr.
+// Density with which the table chooses a direction, in 1/sr.
 float environment_density(vec3 d) {
     float total = table_mean(environment_table).x;
     vec2 uv = table_uv(d), size = vec2(textureSize(environment_table, 0));
@@ -62,15 +62,15 @@ vec3 source_chances(vec3 position, float lights) {
     return sum > 0.0 ? 0.85 * chances / sum + 0.15 * is_there / count : vec3(0.0);
 }
 
-// A point or direction of one source of light, which a shadow ray has still to reach.
+// A point or direction of one source of light, which a shadow ray has yet to reach.
 struct SourceSample {
     vec3 light;      // radiance times SPREAD_LIGHT, or irradiance of a punctual light; over the density of the choice
     vec3 light_dir;  // unit
     float density;   // of the choice in 1/sr; 0 for a punctual light, which nothing else finds
     bool is_environment;  // `light` and `density` still lack the environment's radiance and density
     vec3 ray;        // the direction of the shadow ray
-    float reach;     // its length in lengths of this direction
-    int casting;     // flags of what casts shadows
+    float reach;     // its length, in units of the length of this direction
+    int casting;     // flags of objects that cast shadows
 };
 
 // Chooses a source by `chances` and a point or direction of it. The shadow ray begins at the surface.
@@ -125,13 +125,15 @@ SourceSample sample_source(
     return found;
 }
 
-// Weight of the emission that a ray has found by itself, with a density, where it had a chance to be chosen before.
+// Weight of the emission that a ray has hit with `density`, while the last surface could have chosen emitters with
+// probability `chance`.
 float emission_weight(Hit hit, vec3 normal, vec3 direction, float density, float chance) {
 #ifdef USES_EMITTERS
     int first = scene_instance(hit.instance).first_emitter, number = first + hit.triangle;
     ivec2 at = ivec2(number % EMITTER_TABLE_SIDE, number / EMITTER_TABLE_SIDE);
     float radiance = luminance_of(materials[MATERIAL_INDEX(scene_instance(hit.instance).material)].emissive.rgb);
-    // The chance of a triangle is its area times this; over the area, as density of directions.
+    // A triangle is chosen with a probability proportional to its area; this is the probability per area, as a density
+    // of directions.
     float chosen = chance * radiance / max(emitted_power(), 1e-37) * hit.distance * hit.distance
         / max(abs(dot(normal, direction)), 1e-9);
     bool is_chosen = first >= 0 && texelFetch(emitter_table, max(at, 0), 0).w > 0.0;

@@ -1,4 +1,4 @@
-// The state of a path, and what happens where its ray meets a surface: light that the surface emits, and the choice of
+// The state of a path, and what happens where its ray hits a surface: light that the surface emits, and the choice of
 // one source that lights it.
 #include <frame.glsl>
 #include "camera_ray.glsl"
@@ -9,33 +9,33 @@
 #include "path_catchers.glsl"
 
 struct Path {
-    int vertex;      // surfaces that it has met; below 0 it has to begin
+    int vertex;      // number of surfaces hit; below 0: the path has not begun
     uint ahead;      // surfaces that the ray has passed through
     vec3 throughput;
     vec3 radiance;   // found so far
-    float coverage;  // 1 if it has met a surface
+    float coverage;  // 1 if it has hit a surface
     vec3 origin;     // of the ray
     vec3 direction;
     float nearest;
     float farthest;
     float density;   // of the direction, in 1/sr
-    vec3 chances;    // of the sources of light at the vertex before
+    vec3 chances;    // of the sources of light at the previous vertex
     CaughtPath caught;
 #ifdef TRANSMISSION_LAYER
     Medium medium;
 #endif
 };
 
-// One step of a path: a ray, and the shadow ray of the surface that it meets.
+// One step of a path: a ray, and the shadow ray of the surface that it hits.
 struct Step {
     bool ends;
-    bool reflects;  // the surface sends on light
+    bool reflects;  // the surface reflects light
     bool may_pass;  // the path may go through the surface
     bool is_back;   // the surface bounds a volume, and the path is inside
     bool by_light;  // the source is a punctual light
     SourceSample source;
     float shown;    // part of the source's light that a shadow catcher shows already
-    vec3 seen;      // the direction in which the environment is looked at
+    vec3 seen;      // the direction in which the environment is looked up
     uint point;     // of the low-discrepancy sequence
     uint dimension;
 };
@@ -58,7 +58,7 @@ void leave(inout Path path, vec3 origin) {
     path.farthest = 1e30;
 }
 
-// Adds the emission that a ray has found.
+// Adds the emission of the surface that a ray has hit.
 void find_emission(inout Path path, Surface s, Hit hit, vec3 front, bool emits) {
 #ifdef USES_EMISSION
     bool is_unlit = s.lit == 0.0;
@@ -88,13 +88,13 @@ void choose_source(inout Path path, inout Step now, Surface s) {
     now.seen = now.source.light_dir;
 }
 
-// Lets a ray meet the surface of a hit, or pass through it.
+// Handles the surface of a hit, or lets the ray pass through it.
 void meet_surface(inout Path path, inout Step now, Hit hit, out Surface s) {
     int flags = scene_instance(hit.instance).flags;
     s = scene_surface(hit.instance, hit.triangle, hit.barycentrics, -path.direction);
     vec3 front = scene_geometric_normal(hit.instance, hit.triangle);
     bool is_front = dot(front, path.direction) < 0.0, is_double_sided = (flags & SCENE_DOUBLE_SIDED) != 0;
-    // A back that geometry passes do not show is there for all rays but the camera's.
+    // Back faces that geometry passes do not show exist for all rays except the camera's.
     if (!is_front && !is_double_sided) {
         s.normal = -s.normal;
 #ifdef CLEARCOAT_LAYER

@@ -1,4 +1,4 @@
-// The rest of a step of a path, after its ray has met something: light of the chosen source, and the next ray.
+// The rest of a step of a path, after its ray has hit something: light of the chosen source, and the next ray.
 #include "path_state.glsl"
 
 // Adds the light of the source that a surface has chosen, if it reaches the surface.
@@ -25,7 +25,7 @@ void receive_light(inout Path path, inout Step now, Surface s, int instance, vec
     if (reaches) path.radiance += path.throughput * arriving * passed;
 }
 
-// Adds the light behind all surfaces, which a ray has found.
+// Adds the light behind all surfaces, which a ray has reached.
 void find_background(inout Path path, vec3 sky, float sky_density) {
     vec3 found = light_behind(sky, sky_density, path.vertex == 0, path.density, path.chances.y);
     vec3 behind = behind_catcher(path.caught, found);
@@ -36,7 +36,7 @@ void find_background(inout Path path, vec3 sky, float sky_density) {
 }
 
 #ifdef TRANSMISSION_LAYER
-// Sends a path through the surface, with the chance that this deserves; `xi.z` is used up and made new.
+// Sends a path through the surface with the probability of transmission; `xi.z` is used and then rescaled for reuse.
 void try_to_pass(inout Path path, inout Step now, Surface s, int instance, inout vec3 xi, float survival) {
     float chance = now.is_back ? 1.0 : transmission_chance(s);
     bool goes_through = xi.z < chance;
@@ -54,13 +54,13 @@ void try_to_pass(inout Path path, inout Step now, Surface s, int instance, inout
     leave(path, offset_ray(instance, s.position, side * s.geometric_normal));
     path.medium.has_entered = true;
     ++path.ahead;
-    path.chances = vec3(0.0);  // nothing else finds light through the surface
+    path.chances = vec3(0.0);  // no other strategy finds light through the surface
     path.density = 1.0;
     now.reflects = false;
 }
 #endif
 
-// Sends a path on in a direction that the surface chooses, unless it ends here.
+// Continues a path in a direction that the surface samples, unless it ends here.
 void go_on(inout Path path, inout Step now, Surface s, int instance, vec3 xi, float survival) {
     vec3 start = offset_ray(instance, s.position, s.geometric_normal);
     path.direction = reflected_direction(s, xi);

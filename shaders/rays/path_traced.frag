@@ -1,6 +1,6 @@
 // Path tracing: light of all sources that arrives by any number of reflections (J. Kajiya, "The Rendering Equation",
-// 1986). At each surface one source of light is chosen and tested for shadow, and the path goes on in a direction that
-// the material chooses. Light that both can find is weighted by the power heuristic (E. Veach, "Robust Monte Carlo
+// 1986). At each surface one source of light is chosen and tested for shadow, and the path continues in a direction
+// that the material samples. Light that both can find is weighted by the power heuristic (E. Veach, "Robust Monte Carlo
 // Methods for Light Transport Simulation", 1997).
 //
 // Each invocation follows the paths of its pixel one after the other in a single loop: one step is one ray and its

@@ -4,10 +4,10 @@
 #include <sampled_directions.glsl>
 #include "path_light.glsl"
 
-// How paths go through volumes.
+// The state of a path in volumes.
 struct Medium {
     vec3 absorption;  // per metre, where the path is
-    int channel;      // the colour that dispersion has left of the path; -1 for all
+    int channel;      // the colour channel that dispersion has left of the path; -1 for all
     bool has_entered; // whether the path has passed through a transmissive surface
 };
 
@@ -31,7 +31,7 @@ vec3 boundary_reflectance(Surface s, float VoH) {
     return min(fresnel, 1.0);
 }
 
-// What coat and sheen leave of light that passes through them to the viewer.
+// Fraction of light to the viewer that passes through coat and sheen.
 float below_layers(Surface s) {
     float left = 1.0;
 #ifdef SHEEN_LAYER
@@ -56,7 +56,7 @@ vec3 thin_transmission(Surface s, vec3 light_dir) {
         * (s.transmission * lobe * below_layers(s));
 }
 
-// Chance that a path goes through the surface.
+// Probability that a path goes through the surface.
 float transmission_chance(Surface s) {
     if (s.transmission <= 0.0) return 0.0;
     float NoV = clamp(dot(s.normal, s.view_dir), 1e-4, 1.0);
@@ -66,8 +66,9 @@ float transmission_chance(Surface s) {
     return through > 0.0 ? clamp(through / (through + other), 0.05, 0.95) : 0.0;
 }
 
-// The direction of a path through the boundary, and what is left of it over the chance of the direction; 0 if nothing.
-// `is_back`: the path comes from inside the volume, where the boundary may also reflect all light: then `is_inside`.
+// The direction of a path through the boundary; returns its throughput over the probability of the direction, 0 if
+// there is none. `is_back`: the path comes from inside the volume. The boundary may then also reflect it, which sets
+// `is_inside`.
 vec3 pass_through(
     Surface s, bool is_back, vec3 xi, inout Medium medium, out vec3 direction, out bool is_inside) {
     mat3 frame = tangent_frame_of(s.normal);

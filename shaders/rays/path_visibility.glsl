@@ -1,8 +1,8 @@
-// Shadows of paths: what masks and transparent surfaces let through counts, too.
+// Shadows in path tracing, including light that alpha masks and transparent surfaces let through.
 #include <passing_light.glsl>
 #include <trace.glsl>
 
-// Fraction of light that a surface stops: all of it or none with an alpha mask, else as opaque as it is.
+// Fraction of light that a surface stops: all or nothing with an alpha mask, otherwise its opacity.
 float opacity(int instance, int triangle, vec2 barycentrics) {
     float opaque = 1.0;
 #if defined(SCENE_ANY_MASKED) || defined(SCENE_ANY_BLENDED)
@@ -17,7 +17,7 @@ float opacity(int instance, int triangle, vec2 barycentrics) {
 }
 
 // Fraction of light that arrives from another point. Light that casts shadows (SCENE_CASTS_SHADOW in `wanted`) is that
-// of punctual lights, which no path finds that is refracted: it passes straight through what transmits light.
+// of punctual lights. Refracted paths cannot hit those, so their light passes straight through transmissive surfaces.
 vec3 visibility(vec3 origin, vec3 direction, float farthest, int wanted) {
 #if defined(SCENE_ANY_MASKED) || defined(SCENE_ANY_BLENDED) || defined(TRANSMISSION_LAYER)
     int asks = SCENE_MASKED | SCENE_BLENDED | (wanted != 0 ? SCENE_TRANSMITS : 0);

@@ -33,7 +33,7 @@ uint owen_scramble(uint x, uint seed) {
 // Point `index`, 0 to 15, of a scrambled Sobol sequence in the unit square: every 4 points that begin at a multiple of
 // 4 lie in different quarters of both axes, as do 16 in sixteenths. Different seeds are independent.
 vec2 sobol_point(uint index, uint seed) {
-    uint i = owen_scramble(index, hash(seed)) & 15u;  // another order: several axes have to be independent
+    uint i = owen_scramble(index, hash(seed)) & 15u;  // shuffled: several axes have to be independent
     uint x = bitfieldReverse(i);
     uint y = 0u;
     if ((i & 1u) != 0u) y ^= 0x80000000u;

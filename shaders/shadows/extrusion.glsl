@@ -1,5 +1,5 @@
-// Vertices of a shadow volume: those of the caster, and their extrusion away from the light. `LIGHT` is the scene's
-// index.
+// Vertices of a shadow volume: those of the caster, and their extrusion away from the light. `LIGHT` is the light's
+// index in the scene.
 #include <lights.glsl>
 #include <pass_view.glsl>
 
@@ -15,10 +15,10 @@ vec4 to_clip(vec3 position) {
 }
 
 // Clip-space position of a near cap's vertex. The cap coincides with the lit face and must not be in front of it, so it
-// is moved away from the eye by more than two ways to compute a depth differ. A polygon offset would move the sides,
-// too, and those that cross the eye's plane by any distance.
+// is moved away from the eye by more than the rounding error of its depth. A polygon offset would also move the sides,
+// and those that cross the eye's plane by an arbitrary distance.
 vec4 to_cap(vec3 position) {
-    const float ERROR = 16.0 / 16777216.0;  // of a float's value
+    const float ERROR = 16.0 / 16777216.0;  // relative to the value of a float
     vec4 clip = to_clip(position);
     clip.z -= ERROR * (PASS_VIEW.eye.w > 0.0 ? 2.0 * abs(clip.z) : clip.w);
     return clip;
@@ -26,7 +26,7 @@ vec4 to_cap(vec3 position) {
 
 // Clip-space position of a vertex extruded away from the light. To infinity it is (V - L, 0) for a local light, and the
 // single point -L for a directional one (Everitt and Kilgard 2002). An orthographic view cannot show such points, so w
-// is tiny there instead of 0, which is still beyond everything.
+// is tiny there instead of 0, and the point is still beyond everything.
 vec4 extrude(vec3 position) {
     vec4 light = light_position();
     vec3 direction = position * light.w - light.xyz;

@@ -10,8 +10,8 @@ bool is_before(vec3 a, vec3 b) {
     return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
 }
 
-// Whether a triangle faces the light. The result must be the same for the triangle itself and for its three neighbours
-// that test it, to the last bit: it is computed in a fixed order, from the lexicographically smallest corner.
+// Whether a triangle faces the light. The triangle itself and the three neighbours that test it must get bit-identical
+// results, so the computation has a fixed order, starting from the lexicographically smallest corner.
 bool faces_light(vec3 a, vec3 b, vec3 c) {
     vec3 first = is_before(b, a) && is_before(b, c) ? b : is_before(c, a) && is_before(c, b) ? c : a;
     vec3 second = first == a ? b : first == b ? c : a;

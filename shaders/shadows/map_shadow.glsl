@@ -49,8 +49,9 @@ bool shadow_map_coords(int layer, vec3 position, vec3 normal, out vec3 coords) {
     return is_inside;
 }
 
-// Visibility of a light from a point. The first layer is used that belongs to the light, contains the point, and has
-// the point's distance from the camera in its span. Where the span of the next layer overlaps, the two are blended.
+// Visibility of a light from a point. The lookup uses the first layer that belongs to the light, contains the point,
+// and whose span contains the point's distance from the camera. Where the span of the next layer overlaps, the two are
+// blended.
 float shadow(int light, vec3 position, vec3 normal) {
     vec3 coords;
     float lit = 1.0;

@@ -1,5 +1,5 @@
-// Visualises a shadow map on the surfaces that it shadows. It is looked up by `shadow()`, like shadows are, so that
-// layers blend in the same way: one colour channel after the other takes the place of the visibility.
+// Visualises a shadow map on the surfaces that it shadows. It is looked up by `shadow()`, like shadows, so that layers
+// blend in the same way. Each lookup returns one colour channel in place of the visibility.
 #include <layer_colors.glsl>
 #include "range_fraction.glsl"
 #include <depth_surface.glsl>

@@ -1,5 +1,5 @@
-// Visibility of a light by rays to it: one for a light without a size, else rays to points of a disc that faces the
-// point.
+// Visibility of a light, from rays to it: one ray for a light without a size, otherwise rays to points on a disc that
+// faces the shaded point.
 #include <frame.glsl>
 #include <lights.glsl>
 #include <ray_directions.glsl>
@@ -12,7 +12,7 @@ const int FIRST = FIRST_RAY, PAST = PAST_RAY;
 const int FIRST = 0, PAST = SAMPLES;
 #endif
 
-uniform sampler2D casters;  // of each light 1 if its shadows are traced
+uniform sampler2D casters;  // 1 for each light whose shadows are traced
 uniform float size;         // diameter of point and spot lights, metres
 uniform float angle;        // angular diameter of directional lights, radians
 
@@ -23,7 +23,7 @@ float shadow(int light, vec3 position, vec3 normal) {
     vec3 to_light = source.xyz - position * source.w;
     float distance = length(to_light);
     vec3 axis = to_light / max(distance, 1e-12);
-    if (dot(axis, normal) <= 0.0) return 0.0;  // it shines on the other side
+    if (dot(axis, normal) <= 0.0) return 0.0;  // the light is behind the surface
 
     float spread = source.w == 0.0 ? tan(0.5 * angle) : 0.5 * size / max(distance, 1e-12);
     float offset = ray_offset(position, (camera.view * vec4(position, 1.0)).z);

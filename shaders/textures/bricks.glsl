@@ -13,8 +13,8 @@ uniform float roughness;
 
 TextureSample texture_sample(vec2 uv) {
     float course = floor(uv.y * float(rows));
-    // Every second course is shifted. The last one of an odd number stands between two that are not, and is shifted by
-    // half as much.
+    // Every second course is shifted. If their number is odd, the last course lies between two unshifted ones, and is
+    // shifted by half as much.
     float shift = mod(course, 2.0) + 0.5 * float(rows > 1 && rows % 2 == 1 && int(course) == rows - 1);
     vec2 p = vec2(uv.x * float(columns) + bond * shift, uv.y * float(rows));
     vec2 unit = vec2(1.0 / float(columns), 1.0 / float(rows));  // of a brick with its mortar, in parts of the tile

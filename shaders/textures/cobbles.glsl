@@ -1,4 +1,4 @@
-// Round stones set in sand, as in a pavement or a river's bed.
+// Round stones set in sand, as in a pavement or a river bed.
 #include <texture_sample.glsl>
 uniform vec3 color;
 uniform vec3 second_color;

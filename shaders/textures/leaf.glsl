@@ -15,7 +15,7 @@ TextureSample texture_sample(vec2 uv) {
     float blade = outline - abs(side);
     float stalk = (along < 0.25 ? 0.012 : 0.0) - abs(side);
     float alpha = along < 0.98 && max(blade, stalk) > 0.0 ? 1.0 : 0.0;
-    // Ribs leave the middle one at an angle and bend upwards.
+    // Side ribs branch off the midrib at an angle and bend upwards.
     float rib_at = (t - 0.9 * abs(side) / max(width, 0.1) + 1.2 * side * side) * 9.0 + 0.35 * step(0.0, side);
     float ribs = smoothstep(0.1, 0.02, abs(fract(rib_at) - 0.5) * (0.35 + 1.2 * t));
     float middle = smoothstep(0.016, 0.004, abs(side) * (0.6 + 0.9 * t));

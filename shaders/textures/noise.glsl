@@ -1,4 +1,4 @@
-// Two colours mixed by fractal noise, with relief: plaster, soil, rock, cloth of a sack, ripples of water.
+// Two colours mixed by fractal noise, with relief: plaster, soil, rock, sackcloth, ripples on water.
 #include <texture_sample.glsl>
 uniform vec3 color;
 uniform vec3 second_color;

@@ -1,4 +1,4 @@
-// Boards along u, each of its own piece of wood, with grain, knots and joints.
+// Boards along u, each from a different piece of wood, with grain, knots and joints.
 #include <texture_sample.glsl>
 uniform vec3 color;
 uniform vec3 dark_color;
@@ -37,7 +37,7 @@ TextureSample texture_sample(vec2 uv) {
     vec2 unit = vec2(1.0 / float(columns), 1.0 / float(rows));
     vec2 from_edge = (0.5 - abs(within - 0.5)) * unit;
     float outline = min(from_edge.x, from_edge.y);
-    // Wood is looked up at a place of its own for each board; the period keeps it whole where the tile repeats.
+    // Each board looks up wood at a different place; the period keeps it seamless where the tile repeats.
     ivec2 period = ivec2(max(2, rows), rows);
     vec2 p = vec2(uv.x * float(period.x), uv.y * float(period.y)) + floor(random.xy * vec2(period));
     float knot;

@@ -1,4 +1,4 @@
-// AgX (Sobotka 2022) in the form that Blender ships (Chow 2023). Per channel of primaries that lie inside Rec. 2020, so
+// AgX (Sobotka 2022) in the form that Blender ships (Chow 2023). Applied per channel of primaries inside Rec. 2020, so
 // that bright saturated colours fade to white instead of clipping to a primary; middle grey stays at 0.18.
 const mat3 agx_inset = mat3(0.544908137, 0.140440059, 0.088827412,  // from linear Rec. 709
                             0.373779460, 0.754109599, 0.178877125,
@@ -11,7 +11,7 @@ const mat3 agx_outset = mat3(1.964550960, -0.299322434, -0.164368338,  // to lin
 vec3 agx_sigmoid(vec3 stops) {
     const float slope = 2.4, power = 1.5;
     const vec2 pivot = vec2(10.0 / 16.5, 0.489437090);  // middle grey: 0.18^(1/2.4)
-    // How far each half rises: chosen so that the curve ends at 0 and at 1.
+    // The height of each half, chosen so that the curve ends at 0 and at 1.
     const float toe = pow(pow(pivot.y, -power) - pow(slope * pivot.x, -power), -1.0 / power);
     const float shoulder =
         pow(pow(1.0 - pivot.y, -power) - pow(slope * (1.0 - pivot.x), -power), -1.0 / power);

@@ -88,7 +88,7 @@ def test_labels_are_written_in_dots(session: rg.Session) -> None:
 
 
 def test_more_than_a_sheet_takes_is_said() -> None:
-    with pytest.raises(InputError, match=r"RG209 node 'sheet' .*: it is given 13 pictures; a sheet has up to 12"):
+    with pytest.raises(InputError, match=r"RG209 node 'sheet' .*: it has 13 pictures; a sheet holds up to 12"):
         sheet(["display.color"] * 13, (40, 30)).check()
     with pytest.raises(InputError, match=r"RG209 node 'sheet' .*: it has 2 labels for 1 pictures"):
         sheet(["display.color"], (40, 30), labels=["a", "b"]).check()

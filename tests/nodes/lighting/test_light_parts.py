@@ -111,7 +111,7 @@ def test_irradiance_is_that_of_a_directional_light(session: rg.Session, tmp_path
 
 def test_what_light_per_vertex_cannot_give_is_refused() -> None:
     loaded = rg.load("forward", size=SIZE, sets=("light.evaluate=vertex",))
-    message = r"RG209 .*'specular_albedo' is known per fragment; set evaluate: fragment"
+    message = r"RG209 .*'specular_albedo' is only available per fragment; set `evaluate: fragment`"
     with pytest.raises(RendergraphError, match=message):
         loaded.plan(taps=["light.specular_albedo"])
     loaded.plan(taps=["light.irradiance", "light.direct_specular"])

@@ -237,7 +237,7 @@ def test_an_open_caster_is_refused_or_left_out(session: rg.Session, tmp_path: Pa
     loaded = rg.load(PIPELINE, scene=tmp_path / "s.yaml", size=(16, 16))
     expected = (
         r"RG209 node 'shadows' \(shadow_volumes\): object 'ground' is not closed: in its mesh 'plane' only one triangle "
-        r"has the edge from .*; `casts_shadow: false` or `unclosed: skip` leaves it out"
+        r"has the edge from .*; set `casts_shadow: false` or `unclosed: skip` to leave it out"
     )
     with pytest.raises(InputError, match=expected):
         loaded.check()
