@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _around = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 if os.path.isfile(os.path.join(_around, "pyproject.toml")) and os.path.isdir(os.path.join(_around, "nodes")):
-    __path__.append(_around)  # a checkout has its own nodes, shaders and pipelines, wherever another one is installed
+    __path__.append(_around)  # a checkout uses its own nodes, shaders and pipelines, even if another copy is installed
 
 __all__ = [
     "CacheLimits",

@@ -1,6 +1,6 @@
-"""What this process is doing, in memory that it shares with the process it was forked from.
+"""The activity of this process, in memory shared with the process that forked it.
 
-The command line's supervisor reads it after a crash, and after a draw that took too long.
+The command line's supervisor reads it after a crash or a timeout.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ def note(text: str) -> Callable[[], None]:
 
 
 def during() -> str:
-    """Return ` while …` with the text of the last `note`, or nothing."""
+    """Return ` while …` with the text of the last `note`, or an empty text."""
     text = _MEMORY[:].strip(b"\0 ").decode(errors="ignore")
     return text and f" while {text}"
 
 
 def draw_seconds() -> float:
-    """Return what `limited_draw` allows, 0 without a limit."""
+    """Return the limit of `limited_draw` in seconds, 0 without a limit."""
     return float(os.environ.get(DRAW_TIMEOUT, 0))
 
 
 @contextmanager
 def limited_draw() -> Iterator[None]:
-    """Let SIGALRM end this process where the block takes longer than --draw-timeout: no driver can hold that up."""
+    """Let SIGALRM end this process if the block takes longer than --draw-timeout; drivers cannot block it."""
     if not (seconds := draw_seconds()):
-        yield  # a timer may be the caller's
+        yield  # the caller may have a timer
         return
     set_alarm(seconds)
     try:

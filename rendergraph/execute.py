@@ -1,4 +1,4 @@
-"""Walks the steps, times them, reads back."""
+"""Execute the steps of a frame, time them, and read results back."""
 
 from __future__ import annotations
 
@@ -56,10 +56,10 @@ _CHANGES = {"camera": "", "parameters": "", "size": "", **SCENE_CHANGES}
 
 
 class StepTime(Struct, frozen=True):
-    """Milliseconds of one step in one frame; `gpu_ms` is None where the driver has no timer.
+    """Milliseconds of one step in one frame; `gpu_ms` is None if the driver has no timer.
 
-    A node's `update` counts as part of its first step. `index` is the step's number in its node, -1 where there is only
-    an `update`, and `label` what the author calls it.
+    A node's `update` counts as part of its first step. `index` is the step's number in its node, -1 if there is only an
+    `update`; `label` is the author's name for it.
     """
 
     node: str
@@ -70,8 +70,8 @@ class StepTime(Struct, frozen=True):
 
 
 class FrameTimes(Struct, frozen=True):
-    """What one frame took: wall time until the device was done, each step in order where steps were measured, and how
-    many steps were run of those that there are."""
+    """Times of one frame: wall time until the device was done, the steps in order if they were measured, and the number
+    of steps that ran."""
 
     frame_ms: float
     steps: tuple[StepTime, ...]
@@ -79,7 +79,7 @@ class FrameTimes(Struct, frozen=True):
 
 
 class FrameContext(Struct, eq=False):
-    """What a node's `update` sees and does in one frame (`steps.Frame`)."""
+    """The frame that a node's `update` receives (`steps.Frame`)."""
 
     executable: Executable
     graph: Graph
@@ -95,7 +95,7 @@ class FrameContext(Struct, eq=False):
         return bool(self.node.inputs.get(declared_port(self.node.node.ports(), port, "connected's argument").name))
 
     def views(self, port: Port) -> Sequence[ViewMatrices]:
-        """The views that what is linked to an input was drawn with."""
+        """Return the views with which the texture at an input was drawn."""
         links = self.node.inputs.get(declared_port(self.node.node.ports(), port, "views' argument").name, ())
         tables = [self.graph.textures[end.now].view or CAMERA for end in links]
         return [view for table in tables for view in self.executable.views.current[table]]
@@ -114,7 +114,7 @@ class FrameContext(Struct, eq=False):
         scissor: tuple[int, int, int, int] | None = None,
         depth_bounds: tuple[float, float] | None = None,
     ) -> None:
-        """Draw the steps of a `region` in a part of the picture from now on."""
+        """Restrict the steps of a `region` to a part of the picture from now on."""
         for name, value, annotation in (
             ("number", number, Count),
             ("scissor", scissor, Optional[_Scissor]),  # noqa: UP045  # pyright knows no `|` of Annotated
@@ -122,14 +122,14 @@ class FrameContext(Struct, eq=False):
         ):
             check_argument(name, value, annotation)
         region = self.executable.memory.regions.get((self.node.id, number))
-        if region is not None:  # else nobody reads what its steps make
+        if region is not None:  # otherwise its steps do not run
             region.set(scissor, depth_bounds)
 
     def set_uniform(self, name: str, value: UniformValue) -> None:
         known = self.executable.uniforms.get(self.node.id, ())
         if name not in known:
             hint = suggestion(name, known) if known else ""
-            text = f"set_uniform is given {quoted(name)}, which is no parameter and no keyword of a step{hint}"
+            text = f"set_uniform is given {quoted(name)}, which is not a parameter or a keyword of a step{hint}"
             raise Misuse(text, "RG433")
         mismatch = self.executable.set_uniform(self.node.id, name, uniform_of(name, value))
         if mismatch is not None:
@@ -149,10 +149,10 @@ class FrameContext(Struct, eq=False):
         buffer_of(self.node.node.ports(), port, "write")
         name = f"{self.node.id}.{port.name}"
         if name not in self.executable.plan.placement:
-            return  # nobody reads the buffer in this pipeline
+            return  # the buffer is unused in this pipeline
         role = self.executable.plan.resources[name].role
         if role == "kept":
-            raise Misuse(f"it writes '{port.name}', which is kept, in each frame; take `kept=True` away", "RG433")
+            raise Misuse(f"it writes '{port.name}', which is kept, in each frame; remove `kept=True`", "RG433")
         if role == "history":
             text = f"it writes '{port.name}', which holds last frame's values; write an Internal and copy it in a step"
             raise Misuse(text, "RG433")
@@ -170,9 +170,9 @@ class Runner(Struct, eq=False):
     """Runs an executable frame by frame.
 
     Attributes:
-        reuse: leave out steps whose values are there and would be the same.
-        cull: leave out objects that lie outside of the views that they would be drawn with.
-        ran: how many steps the last frame ran.
+        reuse: skip steps whose values exist and would not change.
+        cull: skip objects outside the views that they would be drawn with.
+        ran: the number of steps that the last frame ran.
     """
 
     executable: Executable
@@ -195,9 +195,9 @@ class Runner(Struct, eq=False):
     def __post_init__(self) -> None:
         active = {step.node for step in self.executable.plan.schedule.steps}
         active |= {f.node for step in self.executable.plan.schedule.steps for f in step.functions}
-        active |= {str(step.view).rpartition(".")[0] for step in self.executable.plan.schedule.steps}  # makers of views
+        active |= {str(step.view).rpartition(".")[0] for step in self.executable.plan.schedule.steps}  # compute views
         for node in reversed(nodes := _views_first(self.graph)):
-            if node.id in active:  # it may ask for the views of what it reads
+            if node.id in active:  # it may request the views of its inputs
                 active |= set(_view_makers(self.graph, node))
         self._active = active
         self._computed = {node.id: found for node in nodes if (found := self._computed_views(node))}
@@ -217,7 +217,7 @@ class Runner(Struct, eq=False):
         return [node.id for node in self._updating if type(node.node).update is not Node.update]
 
     def _computed_views(self, node: GraphNode) -> list[tuple[Views, Callable[[Any], Sequence[ViewMatrices]]]]:
-        """The tables of a node that have views, and the functions that compute them."""
+        """Return the view tables of a node that have a `compute` function, and these functions."""
         tables, ports = self.executable.views.tables, node.node.ports().values()
         return [
             (port, port.compute)
@@ -228,19 +228,19 @@ class Runner(Struct, eq=False):
 
     @property
     def jittering(self) -> str | None:
-        """The node that moves the camera's picture from frame to frame."""
+        """The node that jitters the camera, or None."""
         return self._jittering.id if self._jittering is not None else None
 
     @property
     def drawn(self) -> int:
-        """How many frames have been drawn since history began."""
+        """The number of frames drawn since the history began."""
         return self.executable.drawn
 
     def reset(self) -> None:
-        """Start history afresh: all of it holds the port's first value.
+        """Reset the history to the ports' first values.
 
-        After a single frame one of its two textures still does: the next frame is drawn with the same one. A history
-        that is written in place has one alone.
+        After a single frame, one of its two textures still has the first value, so the next frame uses the same one. A
+        history that is written in place has only one texture.
         """
         is_double = all(count == 2 for count in self._histories.values())
         self._repeats = is_double and (self.drawn == 1 or (self._repeats and not self.drawn))
@@ -269,13 +269,13 @@ class Runner(Struct, eq=False):
         moment: int = 0,
         moments: int = 1,
     ) -> FrameTimes | None:
-        """Draw one frame, or one moment of it; the last moment leaves the mean of their light.
+        """Render one frame, or one moment of it; the last moment writes the mean of the light.
 
         Args:
             index: frame number, from 1.
             time: seconds since frame 1.
             timed: measure each step; otherwise nothing is measured and None returned.
-            moment: number from 0 of as many `moments`, which are drawn one after the other.
+            moment: number of the moment, from 0, of `moments` that are rendered one after the other.
         """
         executable, views = self.executable, self.executable.views
         start = perf_counter()
@@ -305,13 +305,13 @@ class Runner(Struct, eq=False):
         if executable.reads_frame:
             if not moment:
                 self._count_still(moved_from, time)
-            number = index + _MOMENT_STRIDE * (moments - 1 - moment)  # other noise in each; the last has the frame's
+            number = index + _MOMENT_STRIDE * (moments - 1 - moment)  # different noise; the last has the frame's
             if views.set_frame(time, delta, number, self._still):
                 executable.touched.add("frame_block")
         if not self._complete:
             self._check_views()
         if not self.drawn:
-            views.advance()  # nothing has moved before the first frame
+            views.advance()  # nothing moves in the first frame
         executable.drawn += moment == moments - 1
         if views.changed or moved:
             executable.cull_and_sort(moved=moved, cull=self.cull)
@@ -323,10 +323,10 @@ class Runner(Struct, eq=False):
         fresh = executable.fresh or not executable.device.owned
         if fresh:
             self.activate()
-        # Counted by frames drawn, not by their numbers.
+        # Counts rendered frames instead of using frame numbers.
         if not (self._repeats or moment):
             executable.parity = (executable.parity + 1) % len(executable.steps)
-        if fresh or len(executable.binds) > 1:  # else everything is still bound from the frame before
+        if fresh or len(executable.binds) > 1:  # otherwise everything is still bound from the previous frame
             for call in executable.binds[executable.parity]:
                 call()
         listed = executable.steps_for_frame(reuse=self.reuse and moments == 1, repeats=self._repeats)
@@ -358,7 +358,7 @@ class Runner(Struct, eq=False):
             return None
         executable.device.ctx.finish()
         frame_ms = (perf_counter() - start) * 1e3
-        # What is left are nodes that draw nothing.
+        # The remaining nodes have no steps.
         steps = [StepTime(node_id, cpu * 1e3, None, -1, "update") for node_id, cpu in updates.items()]
         for done, cpu, timer in taken:
             gpu = timer.milliseconds() if measured else None
@@ -366,7 +366,7 @@ class Runner(Struct, eq=False):
         return FrameTimes(frame_ms, tuple(steps), self.ran)
 
     def _with_means(self, moment: int, moments: int) -> list[FrameStep]:
-        """The steps of a frame that average the light of its moments."""
+        """Return the steps of a frame that average the light of its moments."""
         executable = self.executable
         if executable.means is None:
             semantics = {str(end): info.semantic for end, info in self.graph.textures.items()}
@@ -376,31 +376,31 @@ class Runner(Struct, eq=False):
 
     def _compute_uploads(self) -> None:
         executable = self.executable
-        restored = executable.kept.keys() - executable.due  # kept values that other pipelines may have left
+        restored = executable.kept.keys() - executable.due  # kept values that may come from other pipelines
         uploads = executable.uploads.items()
         stale = {key: up for key, up in uploads if up.is_stale and (key not in restored or up.upload.sources)}
         if stale:
-            executable.computed(stale)  # noted before one of them may fail
+            executable.computed(stale)  # recorded first, because one of them may fail
         for key, values in stale.items():
             with _author_errors(self.graph[key[0]], "the function of an upload"):
                 values.compute()
 
     def activate(self) -> None:
-        """Write what holds for all frames; needed once, and again when another pipeline used the programs."""
+        """Write state that is constant over frames; needed once, and again after another pipeline used the programs."""
         settle(self.executable.device.raw)
         for call in self.executable.statics:
             call()
         self.executable.fresh = False
 
     def _count_still(self, before: tuple[Scene, ViewMatrices] | None, time: float) -> None:
-        """How many frames nothing has moved: scene, camera, parameters, what nodes write, and what time moves."""
+        """Count the frames since scene, camera, parameters, nodes' writes or anything moved by time has changed."""
         executable, time_before, self._time = self.executable, self._time, time
         still = before is not None and self._seen is not None and before[0] is self._seen[0] and not executable.fresh
         still = still and not _has_moved(before, self._seen) and not executable.was_updated
         self._still = self._still + 1 if still and (time == time_before or not executable.moves_with_time) else 0
 
     def _jittered(self, camera: ViewMatrices) -> ViewMatrices:
-        """The camera with its picture moved as far as a node asks for."""
+        """Return the camera with the jitter that a node requests."""
         node = self._jittering
         if node is None:
             return camera
@@ -411,7 +411,7 @@ class Runner(Struct, eq=False):
         return replace(camera, projection=shifted(camera.projection, 2 * x, 2 * y), jitter=(x, y))
 
     def _check_views(self) -> None:
-        """Every table of a node that runs has been filled by its `update`."""
+        """Check that every view table of running nodes has been set by `update`."""
         for name, table in self.executable.views.tables.items():
             maker = name.rpartition(".")[0]
             if table.count and maker in self._active and name not in self.executable.views.current:
@@ -421,16 +421,16 @@ class Runner(Struct, eq=False):
         self._complete = True
 
     def check(self) -> None:
-        """Raise what the driver has complained about since the last check."""
+        """Raise a RenderError for driver errors since the last check."""
         error = self.executable.device.raw.error()
         if error:
             self.executable.invalidate()
             raise RenderError(Problem("RG614", f"the driver reported {error} while drawing"))
 
     def read(self, resource: str, *, mip: int = 0, layer: int | None = None, stencil: bool = False) -> npt.NDArray[Any]:
-        """A resource's texels after the last frame: (height, width, channels), with layers before where it has them.
+        """Return a resource's texels after the last frame: (height, width, channels), preceded by layers if it has any.
 
-        The top row comes first; samples are resolved. A `layer` stands alone, `stencil` instead of depth.
+        The top row comes first; samples are resolved. `layer` selects one layer, `stencil` replaces depth.
         """
         executable = self.executable
         desc = executable.plan.resources[resource].desc
@@ -443,21 +443,21 @@ class Runner(Struct, eq=False):
 
 
 def _has_moved(before: tuple[Scene, ViewMatrices] | None, now: tuple[Scene, ViewMatrices] | None) -> bool:
-    """Whether the camera of two frames differs, but for its jitter."""
+    """Return whether the cameras of two frames differ, apart from jitter."""
     if before is None or now is None:
         return True
     return not all(np.array_equal(getattr(before[1], name), getattr(now[1], name)) for name in ("view", "projection"))
 
 
 def _view_makers(graph: Graph, node: GraphNode) -> Iterator[str]:
-    """The nodes whose views what a node reads was drawn with."""
+    """Yield the nodes with whose views the inputs of a node were drawn."""
     for ends in node.inputs.values():
         views = (graph.textures[end.now].view for end in ends if not end.previous)
         yield from (maker for maker in (view.rpartition(".")[0] for view in views if view) if maker in graph)
 
 
 def _views_first(graph: Graph) -> list[GraphNode]:
-    """The nodes in the file's order, but those behind the nodes whose views they may ask for."""
+    """Return the nodes in the file's order, but each after the nodes whose views it may request."""
     found: dict[str, GraphNode] = {}
 
     def visit(node: GraphNode) -> None:
@@ -475,12 +475,12 @@ def _views_first(graph: Graph) -> list[GraphNode]:
 
 @contextmanager
 def _author_errors(node: GraphNode, method: str) -> Iterator[None]:
-    """Say of what fails in a stranger's method where it stands."""
+    """Turn an exception of a plugin's method into an error at the author's line."""
     try:
         yield
     except RenderError:
         raise
-    except SceneError as error:  # the author means the user
+    except SceneError as error:  # addressed to the user
         text = f"{node_named(node.id, node.type.name)}: {shown(error, 200)}"
         raise InputError(Problem("RG209", text, node.place)) from error
     except BaseException as error:
@@ -493,7 +493,7 @@ def _author_errors(node: GraphNode, method: str) -> Iterator[None]:
 
 
 def median_times(frames: Sequence[FrameTimes]) -> list[StepTime]:
-    """Per node, in order of execution, the median over frames of its steps' summed times; 0 where none of them ran."""
+    """Return per node, in order of execution, the median over frames of its steps' summed times; 0 if none ran."""
     sums: dict[str, list[tuple[float, float | None]]] = {}
     for frame in frames:
         totals: dict[str, tuple[float, float | None]] = {}
@@ -514,11 +514,11 @@ def median_times(frames: Sequence[FrameTimes]) -> list[StepTime]:
 
 
 def summary(values: Sequence[float]) -> Mapping[str, float]:
-    """Median, least and most."""
+    """Return median, minimum and maximum."""
     return {"median": _median(values), "min": float(min(values)), "max": float(max(values))}
 
 
 def _median(values: Sequence[float]) -> float:
-    """NumPy's imports masked arrays first, `statistics` exact fractions: both take longer than a frame."""
+    """Return the median; NumPy's and `statistics`' functions import modules that take longer than a frame."""
     ranked = sorted(values)
     return float(ranked[len(ranked) // 2] + ranked[(len(ranked) - 1) // 2]) / 2

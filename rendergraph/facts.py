@@ -1,4 +1,4 @@
-"""What a node knows of scene and inputs before the schedule."""
+"""What a node knows about the scene and its inputs before scheduling."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ SELECTIONS: Mapping[str, Callable[[bool, bool], bool]] = {
     "transparent": lambda casts, blended: blended,
     "casters": lambda casts, blended: casts and not blended,
 }
-"""The objects of a geometry step by its word: a test of whether they cast a shadow, and are blended.
+"""The objects of a geometry step by keyword: a test on whether they cast a shadow, and whether they are blended.
 
 Keyframes change neither.
 """
 
 
 class Extra(dict[str, Any]):
-    """Values that an entry of a scene file gives to keys of plugins, by name; read-only. `SceneKey.of` reads one."""
+    """Values of plugins' keys in an entry of a scene file, by name; read-only. `SceneKey.of` reads one."""
 
-    def __hash__(self) -> int:  # type: ignore[override]  # nobody writes to it
+    def __hash__(self) -> int:  # type: ignore[override]  # read-only
         return hash(frozenset(self.items()))
 
 
@@ -58,7 +58,7 @@ class CameraFacts(Struct, frozen=True):
     """The camera that the pipeline renders with; `extra` has the values of plugins' keys.
 
     Attributes:
-        shutter: how much of a frame's time it is open, the most of any frame; 0 while `subframes` are averaged.
+        shutter: fraction of a frame's time for which it is open, the maximum over frames; 0 with `subframes`.
     """
 
     name: str = ""
@@ -70,8 +70,8 @@ def casting_lights(wanted: str | Sequence[str], lights: Sequence[Any]) -> tuple[
     """Return the shadow-casting lights, as indices into the scene's lights, in its order.
 
     Args:
-        wanted: `auto` for the first directional, else the first spot, else the first point light, and `all`, both of
-            those that cast shadows; or a light's name, or several.
+        wanted: `auto` for the first directional, else the first spot, else the first point light, or `all`, both
+            among lights that cast shadows; or the names of one or several lights.
         lights: the scene's lights, each with `name`, `type` and `casts_shadow`.
 
     Raises:
@@ -93,21 +93,21 @@ def casting_lights(wanted: str | Sequence[str], lights: Sequence[Any]) -> tuple[
 
 
 class ObjectFacts(Struct, frozen=True, eq=False):
-    """An object without its place, which may move.
+    """An object without its transform, which may change.
 
-    Meshes are not compared: what was worked out for one object holds for another that is equal in all else.
+    Equality ignores meshes: results for one object hold for another that is equal in everything else.
 
     Attributes:
         triangles, vertices: counts of its mesh.
-        blended: what is behind it is seen through its material, by alpha or as it transmits light.
+        blended: its material lets surfaces behind it show, by alpha or transmission.
         double_sided: its material is visible from both sides.
         hidden: only steps that name it draw it.
-        grain: its material is anisotropic (`anisotropy_strength`) in some frame.
-        emissive: its material emits light in some frame.
-        reflective: its material reflects other than 4 % at normal incidence where it is not metal, in some frame.
+        grain: its material is anisotropic (`anisotropy_strength`) in any frame.
+        emissive: its material emits light in any frame.
+        reflective: its material has a dielectric reflectance other than 4 % at normal incidence in any frame.
         mesh: the name of its mesh.
         extra: values of plugins' keys, see `SceneKey.of`.
-        layers: those of its material in some frame: `clearcoat`, `sheen`, `iridescence`, `transmission`.
+        layers: layers of its material in any frame: `clearcoat`, `sheen`, `iridescence`, `transmission`.
     """
 
     name: str
@@ -144,11 +144,11 @@ class ObjectFacts(Struct, frozen=True, eq=False):
 
     @property
     def _compared(self) -> tuple[object, ...]:
-        return *astuple(self)[:-6], self.extra, self.layers  # all but the mesh and what is asked of it
+        return *astuple(self)[:-6], self.extra, self.layers  # everything except the mesh and its properties
 
     @property
     def closed(self) -> bool:
-        """Whether its mesh, welded where positions are equal, has two triangles at each edge that run it both ways."""
+        """Whether its mesh, with equal positions welded, has two triangles at each edge, in opposite directions."""
         return not self._gap()
 
     @property
@@ -158,7 +158,7 @@ class ObjectFacts(Struct, frozen=True, eq=False):
 
     @property
     def most_layers(self) -> int:
-        """A bound of how many of its drawn surfaces a line of sight can meet.
+        """An upper bound on how many of its drawn surfaces a view ray can hit.
 
         One for a flat mesh, one for a convex mesh and two if it is double-sided; else its number of triangles.
         """
@@ -168,22 +168,22 @@ class ObjectFacts(Struct, frozen=True, eq=False):
 
     @property
     def gap(self) -> str:
-        """Where its mesh is not closed, as a sentence that names object, mesh and edge; empty where it is closed."""
+        """Where its mesh is not closed, as a sentence that names object, mesh and edge; empty if it is closed."""
         gap = self._gap()
         return gap and f"object '{self.name}' is not closed: in its mesh '{self.mesh}' {gap}"
 
 
 class TextureInfo(Struct, frozen=True, gc=False):
-    """What inference found out about an output.
+    """The inferred properties of an output.
 
     Attributes:
-        desc: what it is allocated from (None for a buffer, view or function).
-        semantic: its meaning, after `any` and `like` are followed.
+        desc: its texture's description (None for a buffer, view or function).
+        semantic: its semantic, with `any` and `like` resolved.
         view: the id of the view table it is drawn with (`camera`, or `node.port`), None if not drawn.
-        lights: the scene's light index of each layer or view, empty if they belong to no lights.
+        lights: index of the scene's light for each layer or view, empty if they do not belong to lights.
         bytes: size of a buffer, or of the scene's data; 0 for textures.
-        views: number of views of a table of views, 0 for everything else.
-        element: what a buffer holds, if its port declares it.
+        views: number of views in a view table, 0 for everything else.
+        element: the elements of a buffer, if its port declares them.
     """
 
     desc: TextureDesc | None
@@ -196,7 +196,7 @@ class TextureInfo(Struct, frozen=True, gc=False):
 
     @property
     def storage(self) -> TextureDesc | BufferDesc:
-        """What a texture or buffer is allocated from."""
+        """The description of a texture or buffer."""
         return self.desc if self.desc is not None else BufferDesc(self.bytes, self.element)
 
     @property
@@ -207,20 +207,20 @@ class TextureInfo(Struct, frozen=True, gc=False):
 
     @property
     def holds_values(self) -> bool:
-        """Whether it is a texture or a buffer, which can be read back; a function or a view is neither."""
+        """Whether it is a texture or a buffer, which can be read back, unlike a function or a view."""
         return self.desc is not None or self.bytes > 0
 
 
 class SceneDataFacts(Struct, frozen=True):
-    """What inputs of `SceneData` bring along.
+    """The data behind inputs of `SceneData`.
 
     Attributes:
-        bytes: of buffers and texture arrays, without the indices, lights and materials that every scene has.
-        triangles: of all objects.
-        emitters: triangles that emit light in some frame, of objects that are not hidden.
-        textures: the arrays that hold the materials' textures.
-        smaller: images that are smaller than the layers of their array, of which they fill a corner.
-        trees: a limit of the bytes of the trees for rays, among `bytes`; 0 where no input asks for them.
+        bytes: bytes of buffers and texture arrays, without the indices, lights and materials that every scene has.
+        triangles: number of triangles of all objects.
+        emitters: number of triangles that emit light in any frame, of objects that are not hidden.
+        textures: the arrays of the materials' textures.
+        smaller: number of images that are smaller than the layers of their array and fill a corner.
+        trees: an upper bound on the bytes of the BVHs, included in `bytes`; 0 if no input needs them.
     """
 
     bytes: int = 0
@@ -232,7 +232,7 @@ class SceneDataFacts(Struct, frozen=True):
 
     @property
     def note(self) -> str:
-        """What takes the bytes, in one line."""
+        """A summary of the bytes, in one line."""
         in_arrays = sum(desc.bytes for desc in self.textures)
         text = f"{format_bytes(self.bytes - self.trees - in_arrays)} of buffers"
         if self.trees:
@@ -244,14 +244,14 @@ class SceneDataFacts(Struct, frozen=True):
 
 
 class Facts(Struct, frozen=True):
-    """What a node knows before the schedule; lights and objects are in the scene's order.
+    """What a node knows before scheduling; lights and objects are in the scene's order.
 
     Attributes:
         viewport: width and height of the picture.
-        inputs: what each connected input carries; a `many` input has one entry a link.
-        environment: the environment map as it is uploaded; None if the scene has none.
-        scene_data: what inputs of `SceneData` read; None if no node has one.
-        materials: of the scene, in the order of `FrameScene.materials`.
+        inputs: the properties of each connected input's texture; a `many` input has one entry per link.
+        environment: the environment map as uploaded; None if the scene has none.
+        scene_data: the data behind inputs of `SceneData`; None if no node has one.
+        materials: materials of the scene, in the order of `FrameScene.materials`.
         camera: the camera that renders.
     """
 
@@ -265,7 +265,7 @@ class Facts(Struct, frozen=True):
     camera: CameraFacts = CameraFacts()
 
     def of_scene(self, semantic: Semantic | Signature) -> tuple[TextureInfo, ...]:
-        """What an unconnected input of this meaning reads of the scene; empty if the scene has nothing like it."""
+        """Return what an unconnected input with this semantic reads from the scene; empty if the scene lacks it."""
         if semantic == EnvironmentMap and self.environment is not None:
             return (TextureInfo(self.environment, EnvironmentMap),)
         if semantic == SceneData and self.scene_data is not None:
@@ -273,11 +273,11 @@ class Facts(Struct, frozen=True):
         return ()
 
     def casting(self, wanted: str | Sequence[str]) -> tuple[int, ...]:
-        """The shadow-casting lights, as indices: `auto`, `all`, a light's name or several; see `casting_lights`."""
+        """Return the indices of shadow-casting lights: `auto`, `all`, or names; see `casting_lights`."""
         return casting_lights(wanted, self.lights)
 
     def drawn(self, objects: str | Sequence[str]) -> tuple[ObjectFacts, ...]:
-        """The objects that a geometry step of these `objects` draws: `opaque`, …, or names."""
+        """Return the objects that a geometry step with these `objects` draws: `opaque`, …, or names."""
         takes = SELECTIONS.get(objects) if isinstance(objects, str) else None
         if takes is not None:
             return tuple(one for one in self.objects if not one.hidden and takes(one.casts_shadow, one.blended))
@@ -285,9 +285,9 @@ class Facts(Struct, frozen=True):
         return tuple(one for one in self.objects if one.name in names)
 
     def connected(self, name: str) -> bool:
-        """Whether the input is connected, or takes something of the scene and there is such a thing."""
+        """Return whether the input is connected, or reads something that the scene has."""
         return bool(self.inputs.get(name))
 
     def input(self, name: str) -> TextureInfo:
-        """What a connected input carries; KeyError for others."""
+        """Return the properties of a connected input's texture; KeyError for other inputs."""
         return self.inputs[name][0]

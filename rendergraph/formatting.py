@@ -9,7 +9,7 @@ from typing import Any
 
 
 def jsonable(value: Any) -> Any:
-    """Return mappings, lists and numbers as JSON has them: tuples become lists, infinite and undefined numbers null."""
+    """Return a value as JSON data: tuples become lists, infinite and undefined numbers null."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
@@ -47,7 +47,7 @@ def table(
         rows: cells; None is empty. A row may have fewer than others.
         heads: titles of the columns.
         right: numbers of the columns that are aligned to the right.
-        width: of the whole, in characters; the last column is wrapped to fit.
+        width: width of the table in characters; the last column is wrapped to fit.
     """
     cells = [["" if cell is None else str(cell) for cell in row] for row in [heads, *rows] if row]
     widths = [max(map(len, column)) for column in zip_longest(*cells, fillvalue="")]

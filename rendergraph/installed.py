@@ -1,8 +1,8 @@
-"""Installed packages: their versions and entry points, read from the folders of metadata beside their code.
+"""Installed packages: their versions and entry points, read from the metadata folders beside their code.
 
-`importlib.metadata` can do the same for every kind of archive, but importing its e-mail parsers takes longer than
-planning a pipeline. Here a package is a folder of `sys.path` that ends in `.dist-info` (PyPA, "Recording installed
-projects") or `.egg-info`, or an unpacked egg. Packages in zip archives are not found.
+`importlib.metadata` also supports archives, but importing its e-mail parsers takes longer than planning a pipeline.
+Here a package is a folder in `sys.path` that ends in `.dist-info` (PyPA, "Recording installed projects") or
+`.egg-info`, or an unpacked egg. Packages in zip archives are not found.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ class Package(Struct, frozen=True):
 
     @property
     def name(self) -> str:
-        """The name that its metadata gives, not normalised."""
+        """The name in its metadata, not normalised."""
         return self._field("Name") or _name_and_version(self.folder)[0]
 
     @property
     def version(self) -> str:
-        """The version in the folder's name; from the metadata where an editable installation has none."""
+        """The version in the folder's name; that in the metadata if an editable installation has none."""
         return _name_and_version(self.folder)[1] or self._field("Version")
 
     def _field(self, name: str) -> str:
@@ -54,7 +54,7 @@ class EntryPoint(Struct, frozen=True):
         return self._target[0].strip()
 
     def load(self) -> Any:
-        """Import it; raises whatever the module raises."""
+        """Import the object; exceptions of the module propagate."""
         attributes = self._target[2].strip()
         return reduce(getattr, filter(None, attributes.split(".")), importlib.import_module(self.module))
 
@@ -64,12 +64,12 @@ class EntryPoint(Struct, frozen=True):
 
 
 def plain(name: str) -> str:
-    """Return a package's name as indexes compare them (PEP 503)."""
+    """Return a package's normalised name (PEP 503)."""
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
 def packages() -> dict[str, Package]:
-    """Return the installed packages by their plain names; the first folder of `sys.path` that has one counts."""
+    """Return the installed packages by normalised name; the first folder in `sys.path` that has one wins."""
     found: dict[str, Package] = {}
     for root in dict.fromkeys(sys.path):
         try:
@@ -83,7 +83,7 @@ def packages() -> dict[str, Package]:
 
 @lru_cache
 def _packages_of(root: str, names: tuple[str, ...]) -> dict[str, Package]:
-    """The packages of a folder of `sys.path` that holds these names."""
+    """Return the packages of a folder in `sys.path` that contains these names."""
     found: dict[str, Package] = {}
     metadata = [name for name in names if name.endswith((".dist-info", ".egg-info"))]
     for name in [*metadata, *(["EGG-INFO"] if root.endswith(".egg") else [])]:
@@ -111,7 +111,7 @@ def entry_points(*groups: str) -> Iterator[EntryPoint]:
 
 @lru_cache(4096)
 def _entry_points_of(package: Package, state: Stamp) -> list[EntryPoint]:
-    """All entry points of a package whose file of them is in this state."""
+    """Return all entry points of a package, cached by the state of its entry point file."""
     found, group = [], ""
     for line in map(str.strip, _lines(package.folder, "entry_points.txt") if state else ()):
         if line.startswith("["):
@@ -133,7 +133,7 @@ def require(feature: str, extra: str, *modules: str) -> None:
 
 
 def _name_and_version(folder: str) -> tuple[str, str]:
-    """What the name of a metadata folder says, or for `EGG-INFO` that of the egg."""
+    """Return name and version from the name of a metadata folder, or for `EGG-INFO` from that of the egg."""
     home, name = os.path.split(folder)
     project, _, rest = (os.path.basename(home) if name == "EGG-INFO" else name).rpartition(".")[0].partition("-")
     return project, rest.partition("-")[0]

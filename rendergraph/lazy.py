@@ -1,4 +1,4 @@
-"""Names of a package that are imported when they are first used (PEP 562)."""
+"""Lazily imported names of packages (PEP 562)."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Any
 def lazy_exports(
     package: str, names: Mapping[str, Iterable[str]]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Return `__getattr__` and `__dir__` of a package; `names` has what each of its modules exports."""
+    """Return `__getattr__` and `__dir__` for a package; `names` lists the exports of each of its modules."""
     module_of = {name: module for module, members in names.items() for name in members}
 
     def load(name: str) -> Any:
         if name not in module_of:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        import importlib  # `rendergraph --help` needs nothing that is exported
+        import importlib  # `rendergraph --help` needs no exports
 
         return getattr(importlib.import_module(f".{module_of[name]}", package), name)
 
@@ -24,7 +24,7 @@ def lazy_exports(
 
 
 class CallableModule(ModuleType):
-    """A package that stands for the function of its own name, too: `rendergraph.compare(…)`."""
+    """A package that can be called like the function of the same name: `rendergraph.compare(…)`."""
 
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
         return getattr(self, self.__name__.rpartition(".")[2])(*arguments, **keywords)

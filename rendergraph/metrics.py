@@ -1,17 +1,17 @@
-"""Errors of pictures: RMSE, PSNR, SSIM and FLIP.
+"""Image error metrics: RMSE, PSNR, SSIM and FLIP.
 
 | metric | on display-referred pictures | on scene-linear ones |
 |---|---|---|
 | RMSE | of the sRGB-encoded values 0…1, over pixels and channels | of the linear values |
-| PSNR | −20 log10 RMSE in dB, peak 1; None where the pictures are equal | the same |
+| PSNR | −20 log10 RMSE in dB, peak 1; None if the pictures are equal | the same |
 | SSIM | of the encoded values, the mean of R, G and B | of the values clipped to 0…1 and encoded |
 | FLIP | LDR-FLIP, the mean over pixels | HDR-FLIP, exposures from the reference |
 
-Light has a relative mean square error besides (`relative_mse`), which counts a difference in a dark part of the
-picture as much as one in a bright part.
+Light also has a relative mean square error (`relative_mse`), which weights differences in dark and bright parts of the
+picture equally.
 
-Textures that are neither, such as occlusion or depth (`values`), have the RMSE of their values; the other metrics map
-the reference's minimum and maximum to 0…1 if they lie outside.
+For other textures, such as occlusion or depth (`values`), RMSE applies to the values; the other metrics map the
+reference's minimum and maximum to 0…1 if they lie outside.
 
 Alpha is ignored. SSIM is Wang et al., "Image Quality Assessment", 2004: an 11×11 Gaussian window of standard
 deviation 1.5, K1 = 0.01, K2 = 0.03. FLIP is Andersson et al., "FLIP: A Difference Evaluator for Alternating Images",
@@ -39,9 +39,9 @@ Floats: TypeAlias = npt.NDArray[np.float64]
 Encoding: TypeAlias = Literal["display", "linear", "values"]
 
 PIXELS_PER_DEGREE = 67.0206
-"""FLIP's default viewer: 0.7 m before a screen 0.7 m wide with 3840 pixels."""
+"""FLIP's default viewing conditions: 0.7 m from a screen 0.7 m wide with 3840 pixels."""
 RELATIVE_EPSILON = 0.01
-"""Added to the squared light by which squared errors are divided, so that black pixels do not decide the mean."""
+"""Added to the squared light in the denominator of the relative error, so that black pixels do not dominate."""
 _WINDOW = 11
 _SIGMA = 1.5
 
@@ -87,7 +87,7 @@ def measure(
     error = rmse(a, b)
     shown: tuple[Pixels, Pixels] = (_unit(a, b), _unit(b, b)) if encoding == "values" else (a, b)
     map_ = flip(*shown, encoding=encoding)
-    if not math.isfinite(error):  # FLIP and SSIM clip their pictures, and would make something of NaN and infinity
+    if not math.isfinite(error):  # FLIP and SSIM clip their inputs, which would hide NaN and infinity
         return Metrics(math.nan, math.nan, math.nan, math.nan, more), map_
     if encoding == "linear":
         shown = (to_srgb(a), to_srgb(b))
@@ -96,7 +96,7 @@ def measure(
 
 
 def same(pixels: Pixels, plugins: Sequence[Added[Metric]] = ()) -> Metrics:
-    """Return the metrics of a picture against itself; plugins compute theirs."""
+    """Return the metrics of a picture against itself; those of plugins are computed."""
     own = colors(pixels)
     more = {metric.name: _figure(metric, own, own, ("a picture", "itself")) for metric in plugins}
     return replace(SAME, plugins=more)
@@ -109,7 +109,7 @@ def _figure(metric: Added[Metric], a: Floats, b: Floats, names: tuple[str, str])
     try:
         return float(value)
     except (TypeError, ValueError):
-        text = f"{what} cannot be computed: plugin '{metric.plugin}' gave {type(value).__name__}, not a number"
+        text = f"{what} cannot be computed: plugin '{metric.plugin}' returned {type(value).__name__}, not a number"
         raise InputError(Problem("RG498", text, Place(shown_file(metric.file)))) from None
 
 
@@ -137,7 +137,7 @@ def _values(*pixels: Pixels) -> tuple[Floats, ...]:
 
 
 def _unit(values: Floats, reference: Floats) -> Floats:
-    """Return values as a picture of 0…1; if the reference's lie outside, its minimum and maximum are mapped there."""
+    """Return values as a picture of 0…1; if the reference's exceed that, map its minimum and maximum to 0…1."""
     known = reference[np.isfinite(reference)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
     if low < 0 or high > 1:
@@ -167,10 +167,10 @@ def relative_mse(light: Pixels, reference: Pixels) -> float:
 
 
 def relative_noise(variance: Pixels, reference: Pixels) -> float:
-    """Return the relative mean square error that light has because of its own variance: the mean of v / (r² + 0.01).
+    """Return the relative mean square error of light due to its own variance: the mean of v / (r² + 0.01).
 
     Args:
-        variance: v, of the mean in each pixel, (height, width, channels); one channel holds for all.
+        variance: v, variance of the mean in each pixel, (height, width, channels); one channel applies to all.
         reference: r, the light.
     """
     with np.errstate(invalid="ignore", over="ignore"):  # infinity against infinity
@@ -179,10 +179,10 @@ def relative_noise(variance: Pixels, reference: Pixels) -> float:
 
 
 def signed_difference(light: Pixels, reference: Pixels) -> Floats:
-    """Return how much too bright each pixel is, (height, width): −1 is black where there is light, 0 equal.
+    """Return how much too bright each pixel is, (height, width): 0 is equal, −1 black instead of light.
 
-    It is the difference of the luminances (Rec. 709) as a part of the greater one, to which a hundredth of the
-    reference's mean luminance is added, so that the darkest parts do not show noise alone.
+    It is the difference of luminances (Rec. 709) divided by the greater one plus a hundredth of the reference's mean
+    luminance, so that the darkest parts do not show only noise.
     """
     a, r = (colors(each) @ (0.2126, 0.7152, 0.0722) for each in (light, reference))
     known = r[np.isfinite(r)]
@@ -199,7 +199,7 @@ def psnr(error: float) -> float | None:
 def ssim(a: Pixels, b: Pixels) -> float:
     """Return the mean structural similarity of two pictures of values 0…1, in windows inside the picture.
 
-    Pictures with a side under 11 pixels are continued by reflection.
+    Pictures with a side under 11 pixels are padded by reflection.
     """
     if min(a.shape[:2]) < _WINDOW:
         padding = [(_WINDOW // 2,) * 2] * 2 + [(0, 0)]
@@ -227,11 +227,11 @@ def _windowed(x: Floats) -> Floats:
 def flip(a: Pixels, b: Pixels, *, encoding: Encoding = "display") -> npt.NDArray[np.float32]:
     """Return FLIP at each pixel, 0…1; `b` is the reference.
 
-    OpenImageIO expects linear light for both forms, so display values are decoded first. HDR-FLIP chooses exposures by
-    the reference alone; a `maxluminance` of 0 computes the same as the authors' program. Without light in the reference
-    there is no exposure; light is then clipped to 0…1, as an unexposed display would show it.
+    OpenImageIO expects linear light for both variants, so display values are decoded first. HDR-FLIP chooses exposures
+    from the reference only; `maxluminance` 0 computes the same as the authors' program. A reference without light gives
+    no exposures; light is then clipped to 0…1, as a display without exposure would show it.
     """
-    import OpenImageIO as oiio  # for this metric alone
+    import OpenImageIO as oiio  # only for this metric
 
     hdr = encoding == "linear" and bool(np.any(np.nan_to_num(b) > 0))
     if np.array_equal(a, b) and np.isfinite(a).all():

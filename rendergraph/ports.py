@@ -1,6 +1,6 @@
 """Ports: named connection points and textures of a node.
 
-Sizes, formats, counts, samplers and first contents may be constants or functions `(node, facts)`, which linking calls
+Sizes, formats, counts, samplers and initial contents may be constants or functions `(node, facts)`, which linking calls
 once.
 """
 
@@ -31,14 +31,14 @@ from rendergraph.typecheck import Known, Length, Range, validated
 T = TypeVar("T")
 Rule: TypeAlias = Annotated[Callable[[Any, Facts], T], "a function of node and facts"]
 Ruled: TypeAlias = T | Rule[T]
-"""A constant, or a function of the node and the facts known before the schedule."""
+"""A constant, or a function of the node and the facts known before scheduling."""
 
 Meaning: TypeAlias = Annotated[Semantic, "a Semantic such as Radiance"]
 Called: TypeAlias = Annotated[Signature, "a Signature such as ShadowLookup"]
 Elements: TypeAlias = Annotated[Layout, "a Layout such as Layout('Spark', {'position': 'vec3'})"]
 Count: TypeAlias = Annotated[int, Range(0)]
 Texel: TypeAlias = Annotated[float | tuple[float, ...], Length(1, 4), "a number, up to four of them"]
-"""One value for every channel, or one a channel."""
+"""One value for all channels, or one per channel."""
 Shader: TypeAlias = Annotated[str, Length(1), "the name of a file"]
 Positive: TypeAlias = Annotated[int, Range(1)]
 Samples: TypeAlias = Literal[1, 2, 4, 8, 16]
@@ -66,27 +66,27 @@ class Port(Struct, frozen=True, eq=False, dict=True):
 
     @cached_property
     def whole(self) -> Part:
-        """All of its texture, as a part."""
+        """The whole texture, as a part."""
         return Part(self)
 
     def mip(self, level: int) -> Part:
-        """One level of the mip chain as an ordinary 2D texture."""
+        """Return one level of the mip chain as an ordinary 2D texture."""
         return Part(self, mip=level)
 
     def layer(self, index: int) -> Part:
-        """One array layer or cube face as an ordinary 2D texture."""
+        """Return one array layer or cube face as an ordinary 2D texture."""
         return Part(self, layer=index)
 
     def sampled(self, filter: Filter = "nearest", wrap: Wrap = "clamp", compare: bool = False) -> Part:
-        """The whole texture, read with this sampler; inputs have theirs declared."""
+        """Return the whole texture, read with this sampler; inputs declare theirs."""
         return self.whole.sampled(filter, wrap, compare)
 
     def tested(self) -> Part:
-        """The texture attached read-only for the depth test, of an input that other steps sample."""
+        """Return the texture attached read-only for the depth test, for an input that other steps sample."""
         return Part(self, use="depth_test")
 
     def stored(self) -> Part:
-        """The whole texture, bound as an image of a drawing step, for loads, stores and atomics."""
+        """Return the whole texture, bound as an image of a drawing step, for loads, stores and atomics."""
         return self.whole.stored()
 
 
@@ -105,38 +105,38 @@ class Part(Struct, frozen=True):
         validated(self, f"a part of '{getattr(self.port, 'name', '')}'")
 
     def at_mip(self, level: int) -> Part:
-        """The same layer's level."""
+        """Return a level of the same layer."""
         return replace(self, mip=level)
 
     def at_layer(self, index: int) -> Part:
-        """The same level's layer."""
+        """Return a layer of the same level."""
         return replace(self, layer=index)
 
     def sampled(self, filter: Filter = "nearest", wrap: Wrap = "clamp", compare: bool = False) -> Part:
-        """The same part, read with this sampler."""
+        """Return the same part, read with this sampler."""
         return replace(self, sampler=validated(Sampler(filter, wrap, compare), "sampled"))
 
     def stored(self) -> Part:
-        """The same part, bound as an image."""
+        """Return the same part, bound as an image."""
         return replace(self, use="image")
 
 
 class Input(Port, frozen=True, eq=False):
-    """Something read.
+    """A texture, buffer, function or view that the node reads.
 
     Attributes:
-        semantic: what it must mean; `Any` takes everything, and a `function` needs a `Signature`.
+        semantic: the required semantic; `Any` accepts everything, and a `function` needs a `Signature`.
         size: `same` as the pass's target, or `any`.
         filter, wrap, compare, anisotropy: the sampler.
         border: value outside the texture with `wrap="border"`; 1 by default, and 0 for comparisons.
         samples: `single`, `multi` (a multisampled texture) or `any`; a depth-test attachment takes any.
-        layered: a `texture2d` may also be an array, whose layers steps read one by one, as `port.layer(n)`.
+        layered: a `texture2d` may also be an array, whose layers steps read individually, as `port.layer(n)`.
         optional: it may stay unconnected; the shader is then compiled without `HAS_<NAME>`.
-        many: it takes a list.
+        many: it takes a list of links.
         use: `sample` it, attach it read-only for the `depth_test`, or load it as an `image`.
-        group: the name of the group it belongs to.
+        group: the name of its group.
         element: the elements that a buffer must have.
-        rays: `SceneData` also brings the tree for `#include <trace.glsl>`.
+        rays: `SceneData` also provides the BVH for `#include <trace.glsl>`.
     """
 
     semantic: Meaning | Called
@@ -162,7 +162,7 @@ class Input(Port, frozen=True, eq=False):
             force_setattr(self, "kind", "scene")
 
     def link(self, number: int) -> Part:
-        """One texture of an input that takes a list, counted from 0; its name in the shader has no number."""
+        """Return one texture of an input that takes a list, counted from 0; its name in the shader has no number."""
         return Part(self, link=number)
 
     @cached_property
@@ -171,7 +171,7 @@ class Input(Port, frozen=True, eq=False):
         return None if callable(self.filter) else self.sampler_of(self.filter)
 
     def sampler_of(self, filter: Filter) -> Sampler:
-        """The sampler with this filter."""
+        """Return the sampler with this filter."""
         return Sampler(filter, self.wrap, self.compare, self.anisotropy, self.border)
 
     @cached_property
@@ -184,22 +184,22 @@ class WrittenPort(Port, frozen=True, eq=False):
     """A texture or buffer that the node writes: the shared part of `Output`, `InOut`, `Internal` and `History`.
 
     Attributes:
-        like: an input whose semantic, format, size, layers, view and lights it takes over, each by default.
+        like: an input whose semantic, format, size, layers, view and lights are its defaults.
         format: a name in `textures.FORMATS`; `rgba16f` by default.
         size: see `SizeRule`; the viewport by default.
         mips: levels; 0 means the full chain.
-        layers: array layers, or the depth of a 3D texture; a cube always has 6. By default an array has one for each
-            light, if its `lights` are a rule or those of the table of views it is drawn with, else 1.
+        layers: array layers, or the depth of a 3D texture; a cube always has 6. By default an array has one layer per
+            light, if its `lights` are a rule or those of its view table, else 1.
         samples: samples per texel; by default those of `like`, else of an input of the same size that is attached for
             the `depth_test`, else 1.
         bytes: size of a `buffer`.
-        element, count: what a buffer holds, and how many of them, in place of `bytes`.
-        clear: initial contents; None discards, for passes that write every texel.
-        first: value of every channel in the first frame for readers of `@previous`; 0 by default, and for a continued
+        element, count: type and number of a buffer's elements, in place of `bytes`.
+        clear: initial contents; None leaves them undefined, for passes that write every texel.
+        first: value of every channel that `@previous` reads in the first frame; by default 0, and for a continued
             texture the value of its first writer.
-        view: a `Views` port, a `view` input or a texture input: the view it is drawn with. By default textures that a
-            geometry step draws carry the step's view.
-        lights: an input whose layer-to-light table it carries, or the table itself.
+        view: the view that it is drawn with: a `Views` port, a `view` input or a texture input. By default, textures
+            that a geometry step draws carry the step's view.
+        lights: an input whose table of lights by layer it carries, or the table itself.
     """
 
     semantic: Meaning | None = None
@@ -225,8 +225,8 @@ class Output(WrittenPort, frozen=True, eq=False):
 
     Attributes:
         needs: inputs that must be connected for this output to be used.
-        kept: it outlives the frame: its steps run when they are new or a value they use has changed, and then not
-            again. They must not depend on anything that moves, nor on textures or buffers that are not kept.
+        kept: it is kept from frame to frame: its steps run only when they are new or a value that they use has
+            changed. They must not depend on anything that moves, or on textures or buffers that are not kept.
     """
 
     needs: tuple[str, ...] = ()
@@ -234,7 +234,7 @@ class Output(WrittenPort, frozen=True, eq=False):
 
 
 class InOut(WrittenPort, frozen=True, eq=False):
-    """A texture of another node, continued: each write is a new version, and readers of the old one run before.
+    """A texture of another node that this node continues: a write is a new version, after all readers of the old one.
 
     If it is `optional` and not connected, the node creates the texture from the `WrittenPort` fields.
     """
@@ -249,11 +249,11 @@ class Internal(WrittenPort, frozen=True, eq=False):
 
 
 class History(WrittenPort, frozen=True, eq=False):
-    """A texture of the node's own that outlives the frame: write `self.x`, read last frame's `self.x.previous`."""
+    """The node's own texture that persists between frames: write `self.x`, read last frame's `self.x.previous`."""
 
     @property
     def previous(self) -> Part:
-        """Last frame's value, `first` in the first frame."""
+        """Last frame's value; `first` in the first frame."""
         return Part(self, previous=True)
 
 
@@ -261,13 +261,13 @@ class Views(Port, frozen=True, eq=False):
     """A table of views that the node computes in `update`, one for each layer that it draws.
 
     Attributes:
-        count: number of views; by default that of its lights, 1 without any.
-        size: see `SizeRule`; the default size, also for factors, of what is drawn with it and of what is computed from
-            that texel by texel. The viewport by default.
-        lights: the scene's light index of each view, empty if views belong to no lights.
-        public: whether others may connect it (it is then an output of kind `view`).
-        compute: function of the `Frame` that returns the views of each frame, in place of `update`. It does not know
-            the node's parameters, so the page of `view` can move those without asking it.
+        count: number of views; by default the number of its lights, or 1 without lights.
+        size: see `SizeRule`; the viewport by default. It is the default size, also for factors, of textures drawn with
+            it and of textures computed from those texel by texel.
+        lights: index of the scene's light for each view, empty if the views do not belong to lights.
+        public: whether other nodes may connect it (it is then an output of kind `view`).
+        compute: function of the `Frame` that returns the views of each frame, in place of `update`. It does not depend
+            on the node's parameters, so the page of `view` can change them without calling it.
     """
 
     count: Ruled[Count] | None = None
@@ -283,9 +283,9 @@ class Function(Port, frozen=True, eq=False):
 
     Attributes:
         shader: the file with the function's text, beside the node's shaders.
-        reads: the ports its text samples: names, or `port.sampled(…)` for internals and outputs, which are otherwise
-            read unfiltered and from their first mip. An unconnected input and an internal that is not written are left
-            out; `HAS_<NAME>` is then not defined.
+        reads: the ports that its text samples: names, or `port.sampled(…)` for internals and outputs, which are
+            otherwise read unfiltered and from their first mip. Unconnected inputs and unwritten internals are left
+            out, and `HAS_<NAME>` is then undefined.
     """
 
     signature: Called

@@ -1,7 +1,7 @@
-"""YAML text of a pipeline to a Document: only known keys, each with the kind of value it takes.
+"""Read the YAML text of a pipeline into a Document with only known keys and values of the right types.
 
-What is wrong is reported and left out, so that later stages can go on looking for mistakes in the rest and need not ask
-again what kind of value they hold.
+Mistakes are reported and left out, so that later stages can find mistakes in the rest and need not check the types of
+values again.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from rendergraph.typecheck import Brief
 CODES = Codes(unknown="RG105", wrong="RG106", name="RG107", file="RG013")
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,99}\Z")
-"""Node ids, output names, parameter names; long ones make messages and the search for the nearest name long."""
+"""Node ids, output names, parameter names; limited in length for messages and suggestions."""
 
 _NAMING = Naming(NAME, "letters, digits, '_' and '-', no digit first")
 _LINK: Any = Annotated[TEXT | listed(TEXT, "links"), "a link as in 'node.port', a list of links, or null"]
@@ -40,34 +40,34 @@ SIZE = Key(
 PARAMETER = Table(
     "'{}'",
     (
-        Key("default", Any, "Its value where nothing sets it."),
+        Key("default", Any, "Default value."),
         Key("min", NUMBER, "Minimum."),
         Key("max", NUMBER, "Maximum."),
-        Key("doc", TEXT, "What it does, in a line."),
+        Key("doc", TEXT, "What it does, in one line."),
     ),
 )
 INPUT = Table(
     "'{}'",
     (
-        Key("semantic", TEXT, "What its texels mean, such as `radiance`."),
+        Key("semantic", TEXT, "Meaning of its texels, such as `radiance`."),
         Key("optional", bool, "Whether it may stay unconnected."),
-        Key("doc", TEXT, "What it is for, in a line."),
+        Key("doc", TEXT, "What it is for, in one line."),
     ),
 )
 NODE = Table(
     "'{}'",
     (
-        # A resolved file carries its sub-pipelines where it would name their files.
+        # A resolved file contains its sub-pipelines in place of their file names.
         Key("type", Recursive(TEXT, lambda: PIPELINE), "A node type, or a pipeline file."),
         Key("inputs", MapOf(_LINK, _NAMING), "Input to `node.port`, to a node's id, or to null for nothing."),
         Key("params", MapOf(Any, _NAMING), "Parameter to value; null is its default."),
-        Key("enabled", bool, "`false` takes the node out; nodes that read it read its input instead.", default=True),
+        Key("enabled", bool, "`false` disables the node; nodes that read it read its input instead.", default=True),
     ),
 )
 VIEW = Table(
     "'{}'",
     (
-        Key("camera", TEXT, "A camera of the scene, or one in words: 'eye=0,1,5 target=0,1,0 fov=40'."),
+        Key("camera", TEXT, "Name of one of the scene's cameras, or a new camera: 'eye=0,1,5 target=0,1,0 fov=40'."),
         Key("frame", whole(1, 100_000), "Number of the frame."),
         Key("environment", TEXT, "Environment map: a shipped name, a file, or `none`."),
     ),
@@ -77,7 +77,7 @@ PIPELINE: Table = Table(
     "a pipeline",
     (
         Key("rendergraph", version(1), "Version of the format.", code="RG016"),
-        Key("description", TEXT, "What the pipeline shows, in a line."),
+        Key("description", TEXT, "What the pipeline shows, in one line."),
         Key("extends", shipped(shipped_pipelines), "A shipped pipeline or a file; the rest is a merge patch on it."),
         SIZE,
         Key(
@@ -95,7 +95,7 @@ PIPELINE: Table = Table(
         Key(
             "warm_up",
             whole(1, 10_000),
-            "Number of earlier frames that a frame depends on; each part of a split film starts so many frames early.",
+            "Number of earlier frames on which a frame depends; each part of a split film starts this much earlier.",
         ),
         Key(
             "views",
@@ -110,7 +110,7 @@ PIPELINE: Table = Table(
     ),
     code="RG101",
 )
-"""What a pipeline file holds; the one source for checking, `explain`, the schema and the reference."""
+"""The keys of a pipeline file; the only source for checking, `explain`, the schema and the reference."""
 
 _PATCH = replace(
     PIPELINE,
@@ -135,7 +135,7 @@ def read(
         if path is None:
             raise ValueError("read() needs a path or a text")
         text = read_text(path, limits, name)
-        if is_standard_input(path):  # what it refers to is relative to the current folder
+        if is_standard_input(path):  # its paths are relative to the current folder
             path, name = None, "stdin"
     return _read(path, text, limits, name, keep_going, patch)
 
@@ -147,7 +147,7 @@ def _read(path: Path | None, text: str, limits: YamlLimits, name: str, keep_goin
 
 
 def checked(document: Document, *, keep_going: bool = False, patch: bool = False) -> Document:
-    """Return the document without the parts that are not a pipeline's, and problems that say so."""
+    """Return the document without invalid parts, and with the problems about them."""
     validator, value = Validator(CODES, document.problems), document.root
     if value.data is None and not patch:
         validator.report(value, CODES.file, f"the file is empty; a pipeline has at least {_HOLDS}")
@@ -168,19 +168,19 @@ def checked(document: Document, *, keep_going: bool = False, patch: bool = False
 
 
 def entries(value: Value | None, *path: str) -> dict[str, Value]:
-    """Return the non-null entries of a mapping at a path; empty where it does not exist."""
+    """Return the non-null entries of a mapping at a path; empty if it does not exist."""
     found = value.get(*path) if value is not None else None
     data = found.data if found is not None else None
     return {key: child for key, child in data.items() if child.data is not None} if isinstance(data, dict) else {}
 
 
 def flag(value: Value | None, *path: str) -> bool:
-    """Return whether `true` is at a path."""
+    """Return whether the value at a path is `true`."""
     found = value.get(*path) if value is not None else None
     return found is not None and found.data is True
 
 
 def word(value: Value | None, *path: str) -> str | None:
-    """Return the text at a path, None where it does not exist."""
+    """Return the text at a path; None if it does not exist."""
     found = value.get(*path) if value is not None else None
     return found.data if found is not None and isinstance(found.data, str) else None

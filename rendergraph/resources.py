@@ -1,4 +1,4 @@
-"""Reading the text that travels with the package: pipelines, scenes, shaders, error pages."""
+"""Read the text files in the package: pipelines, scenes, shaders, error pages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _NAME = re.compile(r"[A-Za-z0-9_-]+\Z")
 
 
 def is_name(text: str) -> bool:
-    """Whether a text names something shipped or installed, rather than a path."""
+    """Return whether a text names something shipped or installed, rather than a path."""
     return bool(_NAME.match(text))
 
 
@@ -41,5 +41,5 @@ def _by_name(home: Path) -> dict[str, Path]:
 
 @lru_cache
 def _listed(home: Path, changed: int) -> dict[str, Path]:
-    """`changed` is the folder's time stamp, which changes when a file comes or goes."""
+    """List a folder; `changed` is its time stamp, which changes when files are added or removed."""
     return {path.stem: path for path in sorted(home.glob("*.yaml"), key=lambda path: path.stem)}

@@ -39,13 +39,13 @@ Links = Mapping[str, Mapping[str, Sequence[str]]]
 
 
 def schema(catalog: Catalog, bases: Mapping[str, Mapping[str, str]] = {}, links: Links | None = None) -> Schema:
-    """Return a draft-07 schema, which is what editors read.
+    """Return a draft-07 schema, which editors support.
 
-    A type that cannot be imported is a legal word without further rules: its plugin's mistake is not the file's.
+    A type that cannot be imported is a legal name without further rules: its plugin's mistake is not the file's.
 
     Args:
-        bases: what files extend, as it is written in them, with the types of its nodes by their ids.
-        links: what editors offer as links; others are as legal, as the file may have changed since.
+        bases: files that can be extended, as named in `extends`, with the types of their nodes by id.
+        links: links that editors suggest; others are legal, too, because the file may have changed since.
     """
     types: dict[str, type[Node] | None] = dict.fromkeys(catalog.names())
     types |= {found.name: found.cls for found in catalog.usable()[0]}
@@ -61,12 +61,12 @@ def schema(catalog: Catalog, bases: Mapping[str, Mapping[str, str]] = {}, links:
     found["properties"]["nodes"]["additionalProperties"] = {"$ref": "#/definitions/node"}
     found["definitions"] = {"node": _node(types, rules), "whole_node": _whole_node(needed)}
     whole = {"properties": {"nodes": {"additionalProperties": {"$ref": "#/definitions/whole_node"}}}}
-    # Neither a file that extends another nor a patch connects everything; both lack one of these.
+    # Files that extend others, and patches, need not connect everything; they lack one of these keys.
     alone = {"required": ["rendergraph", "nodes", "outputs"], "not": {"required": ["extends"]}}
     conditions: list[Schema] = [{"if": alone, "then": whole}]
     for base, nodes in bases.items():
         known = {id: {"$ref": f"#/definitions/inherited_{name}"} for id, name in nodes.items() if name in rules}
-        for name in {*nodes.values()} & {*rules}:  # of this type as long as nothing else is said
+        for name in {*nodes.values()} & {*rules}:  # the type of the node unless the file changes it
             found["definitions"][f"inherited_{name}"] = {"if": {"not": {"required": ["type"]}}, "then": rules[name]}
         condition = {"properties": {"extends": {"const": base}}, "required": ["extends"]}
         then = {"properties": {"nodes": {"properties": known}}}
@@ -85,7 +85,7 @@ def shipped_bases(catalog: Catalog) -> dict[str, dict[str, str]]:
 
 
 def base_of(file: Path, spec: PipelineSpec) -> dict[str, dict[str, str]]:
-    """Return the types of the nodes of what a pipeline file extends, under the name it has there; see `schema`."""
+    """Return the types of the nodes in the file that a pipeline file extends, by its name there; see `schema`."""
     base = word(read(file, keep_going=True).root, "extends")
     return {} if base is None else {base: _types_in(spec)}
 
@@ -105,7 +105,7 @@ def _node(types: Mapping[str, type[Node] | None], rules: Mapping[str, Schema]) -
     found = schema_of(NODE)
     properties = found["properties"]
     properties["type"]["anyOf"] = [*known, *elsewhere, {"type": "null"}]
-    for part in ("inputs", "params"):  # what they are the type says
+    for part in ("inputs", "params"):  # the node's type defines them
         properties[part] = {"type": ["object", "null"], "description": properties[part]["description"]}
     found["allOf"] = [
         {"if": {"properties": {"type": {"const": name}}, "required": ["type"]}, "then": then}
@@ -115,7 +115,7 @@ def _node(types: Mapping[str, type[Node] | None], rules: Mapping[str, Schema]) -
 
 
 def _whole_node(needed: Mapping[str, Schema]) -> Schema:
-    """Ask for the required inputs of each type, except of a node that is disabled."""
+    """Require the inputs that each type needs, except for disabled nodes."""
     rules = [
         {"if": {"properties": {"type": {"const": name}}, "required": ["type"]}, "then": then}
         for name, then in needed.items()
@@ -126,7 +126,7 @@ def _whole_node(needed: Mapping[str, Schema]) -> Schema:
 
 
 def _needed(cls: type[Node]) -> Schema:
-    """Ask for the inputs without which a node cannot work; a group may stand for its members."""
+    """Require the inputs that a node needs; a group may stand for its members."""
     inputs, groups = cls.inputs(), cls.groups()
     rules: list[Schema] = []
     for name, port in inputs.items():
@@ -146,7 +146,7 @@ def _offered(inputs: Mapping[str, Sequence[str]]) -> Schema:
 
 
 def _about(cls: type[Node]) -> str:
-    """Its docs, and what others can connect to; lines of a paragraph are joined."""
+    """Return the docs of a type and its outputs; lines of a paragraph are joined."""
     doc = re.sub(r"(?<!\n)\n(?![\n ])", " ", inspect.getdoc(cls) or "")
     likes = {name: getattr(port, "like", None) for name, port in cls.outputs().items()}
     words = {name: f"like `{like}`" if like else _port_type(cls.outputs()[name]) for name, like in likes.items()}
@@ -162,7 +162,7 @@ def _inputs(type_name: str, cls: type[Node]) -> Schema:
 
 
 def _known_names(properties: Schema, message: str) -> Schema:
-    """A mapping of these; others may be null, which drops what a node of another type had and this one lacks."""
+    """Return a mapping with these properties; others may be null, to drop what the new type of a node lacks."""
     others = {"type": "null", "errorMessage": message}
     return {"type": ["object", "null"], "additionalProperties": others, "properties": properties}
 
@@ -180,7 +180,7 @@ def _is_required(port: Input | InOut) -> bool:
 
 
 def _port_type(port: Port) -> str:
-    """What a port carries, in a few words: `radiance`, `shadow(), many`, `depth, buffer`."""
+    """Return a short description of a port: `radiance`, `shadow(), many`, `depth, buffer`."""
     if isinstance(port, Function):
         return f"{port.signature.name}()"
     if isinstance(port, Views):
@@ -198,24 +198,24 @@ def _port_type(port: Port) -> str:
 
 
 def _param(parameter: Parameter, extensions: Extensions) -> Schema:
-    """One parameter: its own values, null for the default, or a parameter of the pipeline."""
+    """Return the schema of a parameter: its values, null for the default, or a parameter of the pipeline."""
     added = extensions.choices(parameter.open_name) if parameter.open_name else []
     doc = " ".join([parameter.doc, *(f"`{one.name}` ({one.plugin}): {about(one.value)}" for one in added)])
     own = json_schema(parameter.closed(tuple(one.name for one in added)))
     limits = parameter.limits.schema("number")
     common = {"description": _about_param(parameter, doc), "default": json.loads(json.dumps(parameter.default))}
     kind = own.get("type")
-    if kind in _WORDS:  # without alternatives, so that editors name the limit that is violated
+    if kind in _WORDS:  # without alternatives, so that editors report the violated limit
         message = f"expected {_WORDS[kind]}, or $name for a parameter of the pipeline"
         found = {"type": [kind, "string", "null"], "pattern": _REFERENCE["pattern"], "patternErrorMessage": message}
         return {**common, **own, **limits, **found}
-    alternatives = own.get("anyOf", [own])  # limits beside alternatives hold for those that are numbers
+    alternatives = own.get("anyOf", [own])  # limits beside alternatives apply to numbers
     alternatives = [{**p, **limits} if p.get("type") in ("number", "integer") else p for p in alternatives]
     return {**common, "anyOf": [*alternatives, {"type": "null"}, _REFERENCE]}
 
 
 def _about_param(parameter: Parameter, doc: str) -> str:
-    """Its line of documentation, its default, its range and what a change of it costs."""
+    """Return its documentation, default, range and the cost of changing it."""
     unit = f" {parameter.unit}" if parameter.unit else ""
     limits = f",{parameter.limits}" if str(parameter.limits) else ""
     default = json.dumps(parameter.default, ensure_ascii=False)
@@ -227,10 +227,10 @@ _MOST_BYTES = 1 << 24
 
 
 def outdated(pipeline: Path, roots: Roots, catalog: Catalog, plugins: Iterable[Path] = ()) -> Problem | None:
-    """Return a warning if the schema that a pipeline file's modeline names was written before its node types changed.
+    """Return a warning if the schema in a pipeline file's modeline is older than a change of its node types.
 
-    A schema outside `roots` is not read. Types that only the schema knows are fine: it may be for more plugins than
-    this run has. `plugins` are those of the command line, for the suggested command.
+    A schema outside `roots` is not read. Types that only the schema has are fine: it may include more plugins than this
+    run. `plugins` are those of the command line, for the suggested command.
     """
     text = pipeline.read_text(encoding="utf-8", errors="replace")
     found = _MODELINE.search(text)
@@ -242,7 +242,7 @@ def outdated(pipeline: Path, roots: Roots, catalog: Catalog, plugins: Iterable[P
             return None
         written = json.loads(file.read_text(encoding="utf-8"))
         then = _rules(written)
-    except (OSError, ValueError, TypeError, KeyError, InputError):  # not there, or not ours
+    except (OSError, ValueError, TypeError, KeyError, InputError):  # missing, or not one of rendergraph's
         return None
     now = _rules(schema(catalog))
     changed = [f"'{name}' {'has changed' if name in then else 'is new'}" for name in now if now[name] != then.get(name)]
@@ -252,11 +252,11 @@ def outdated(pipeline: Path, roots: Roots, catalog: Catalog, plugins: Iterable[P
     words = [word for plugin in plugins for word in ("--plugin", str(plugin))]
     conditions = [entry["if"] for entry in written.get("allOf", ()) if "properties" in entry.get("if", {})]
     bases = {condition["properties"]["extends"]["const"] for condition in conditions}
-    if bases - {*shipped_pipelines()}:  # it was written for a file that extends another
+    if bases - {*shipped_pipelines()}:  # written for a file that extends another
         words.append(shown_file(pipeline))
     command = shlex.join(["rendergraph", "schema", *words, "-o", shown_file(os.path.normpath(file))])
     way_out = f"`{command}` writes it again"
-    # The plugins of those are not known here; a shader file comes with the pipeline that names it.
+    # Their plugins are not known here; shader files belong to the pipeline that names them.
     if gone := [f"'{name}'" for name in then if name not in now and "/" not in name]:
         more = f" and {len(gone) - 3} more" if len(gone) > 3 else ""
         way_out += f", with --plugin for {', '.join(gone[:3])}{more} too"

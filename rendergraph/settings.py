@@ -1,8 +1,8 @@
-"""The project's settings file, what a session keeps, and the folders that files may be read from.
+"""The project's settings file, cache limits, and the folders from which files may be read.
 
-Pipelines and scenes are untrusted data: whatever they refer to must lie, links followed, inside a root. The settings
-file `rendergraph.toml` marks a project's folder as one. What it says beyond that (more roots, plugins, which are code)
-is believed only where the user stands in that project, so that a downloaded folder cannot bring its own permissions.
+Pipelines and scenes are untrusted data: files that they refer to must lie inside a root, with symbolic links resolved.
+The settings file `rendergraph.toml` makes a project's folder a root. Its other settings (more roots, plugins, which are
+code) apply only if the user works inside that project, so that a downloaded folder cannot grant itself permissions.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ _SIZE = Annotated[int, Range(0, 1_000_000)]
 
 
 class CacheLimits(Struct, frozen=True):
-    """What a session keeps on the GPU; what was used least recently goes first.
+    """Limits of a session's caches on the GPU, from which the least recently used is freed first.
 
     Attributes:
-        programs: compiled programs, each of which takes some MB on a software driver.
+        programs: number of compiled programs, each of which takes a few MB with a software driver.
         mebibytes: textures and buffers of compiled pipelines, and copies of kept values, in MiB.
 
-    The last four compiled pipelines are kept, as far as `mebibytes` allows, with all their programs. What is drawn is
-    kept whatever it takes.
+    The last four compiled pipelines are cached with all their programs, as far as `mebibytes` allows. The current
+    pipeline is always kept.
     """
 
     programs: int = 32
@@ -62,14 +62,12 @@ _CACHE = Table(
 SETTINGS = Table(
     "a settings file",
     (
-        Key(
-            "asset_roots", _PATHS, "Further folders that files may be read from.", example='asset_roots = ["../assets"]'
-        ),
+        Key("asset_roots", _PATHS, "More folders from which files may be read.", example='asset_roots = ["../assets"]'),
         Key("plugins", _PATHS, "Files and folders with nodes: code.", example='plugins = ["my_effects"]'),
-        Key("cache", _CACHE, "What a session keeps on the GPU.", example="cache = {programs = 64}"),
+        Key("cache", _CACHE, "Limits of a session's caches on the GPU.", example="cache = {programs = 64}"),
     ),
 )
-"""What `rendergraph.toml` holds; its paths are relative to it."""
+"""The keys of `rendergraph.toml`; its paths are relative to it."""
 _CODES = Codes(unknown="RG017", wrong="RG017", name="RG017", file="RG017")
 _MOST_BYTES = 100_000
 
@@ -86,7 +84,7 @@ class Settings(Struct, frozen=True):
 
 
 def nearest_settings(folder: Path) -> Settings | None:
-    """Return the settings file in a folder, links followed, or the nearest one above it."""
+    """Return the settings file in a folder, with symbolic links resolved, or the nearest one above it."""
     for candidate in (folder, *folder.parents):
         file = candidate / FILE_NAME
         record_read(file)
@@ -96,7 +94,7 @@ def nearest_settings(folder: Path) -> Settings | None:
 
 
 def load(file: Path) -> Settings:
-    import tomllib  # most projects have no such file
+    import tomllib  # only for projects with such a file
 
     source = Source(str(file), file)
     try:
@@ -114,16 +112,16 @@ def load(file: Path) -> Settings:
 
 
 class Roots(Struct, frozen=True):
-    """The folders that files may be read from, links followed."""
+    """The folders from which files may be read, with symbolic links resolved."""
 
     folders: tuple[Path, ...]
 
     @classmethod
     def of_file(cls, file: Path, extra: Iterable[Path] = ()) -> Roots:
-        """Return the roots of everything reached from a file that the user named.
+        """Return the roots for all files reached from a file that the user named.
 
         Args:
-            file: the file; its own folder is a root, and that of the nearest settings file above it.
+            file: the file; its own folder is a root, and so is that of the nearest settings file above it.
         """
         home = _resolved(file.parent)
         folders = [home]
@@ -137,7 +135,7 @@ class Roots(Struct, frozen=True):
         return cls(tuple(dict.fromkeys(folders)))
 
     def check(self, path: Path, place: Place | None = None, written: str | None = None) -> Path:
-        """Return the file a path leads to, links followed; see `mistake`."""
+        """Return the file at a path, with symbolic links resolved; raise for a `mistake`."""
         mistake = self.mistake(path, written)
         if mistake:
             raise InputError(Problem(*mistake, place))
@@ -147,8 +145,8 @@ class Roots(Struct, frozen=True):
         """Return code and text if a path may not be read: it is outside all roots, missing, or not a regular file.
 
         Args:
-            path: joined to the folder of the file it is written in.
-            written: how it is written there; the path by default.
+            path: the path, joined to the folder of the file that contains it.
+            written: the path as written there; by default `path`.
         """
         name = shown(written or path, 120)
         record_read(path)
@@ -156,11 +154,9 @@ class Roots(Struct, frozen=True):
             return "RG012", f"'{name}' is not a file path; only local files can be loaded"
         try:
             resolved = path.resolve()
-            # First of all: a pipeline must not learn which files exist outside.
+            # Checked first, so that a pipeline cannot find out which files exist outside.
             if not any(resolved.is_relative_to(folder) for folder in self.folders):
-                text = (
-                    f"'{name}' lies outside the folder of the file it is reached from; --asset-root DIR allows DIR too"
-                )
+                text = f"'{name}' lies outside the folder of the file that names it; --asset-root DIR allows DIR too"
                 return "RG012", text
             if resolved.is_dir() if folder else resolved.is_file():
                 return None
@@ -184,7 +180,7 @@ def expand_home(text: str) -> Path:
 
 
 def _neighbour(path: Path) -> str:
-    from difflib import get_close_matches  # where something is misspelt alone
+    from difflib import get_close_matches  # only for misspelt names
 
     try:
         names = sorted(entry.name for entry in islice(path.parent.iterdir(), 1000))

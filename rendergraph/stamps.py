@@ -1,11 +1,10 @@
-"""Which files a piece of work read, whether they have changed since, and a cache of results that depend on files.
+"""Track which files a computation read and whether they have changed, and cache results that depend on files.
 
-Code that opens a file, or looks for one in vain, calls `record_read` first. Code that keeps the result of such work
-collects the reads with `track_reads` and repeats the work when `modified` names a file. Taking a kept result replays
-its reads (`unchanged`, `replay_reads`), so that an outer collection is always complete. `FileCache` does all of that.
-
-A file's state is its modification time, size and inode: one `stat` each, the same on every system; no file is read.
-A folder is listed again only if its own modification time has changed.
+Code that opens a file, or looks for one that may be missing, calls `record_read` first. Code that caches a result
+collects the reads with `track_reads` and computes it again when `modified` names a file. Using a cached result replays
+its reads (`unchanged`, `replay_reads`), so that outer collections are always complete. `FileCache` does all of this. A
+file's state is its modification time, size and inode: one `stat` each, the same on every system; no file is read. A
+folder is listed again only if its own modification time has changed.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from typing import Generic, TypeAlias, TypeVar
 T = TypeVar("T")
 
 Stamp: TypeAlias = "tuple[object, ...] | None"
-"""The state of a file; of a folder the names in it; None where nothing exists."""
+"""The state of a file; for a folder, the names in it; None if nothing exists."""
 
 Stamps: TypeAlias = "Mapping[str, Stamp]"
 """Absolute paths and their states, in the order they were read."""
@@ -37,7 +36,7 @@ _READ: ContextVar[dict[str, Stamp] | None] = ContextVar("read", default=None)
 
 
 def stamp(path: Path | str) -> Stamp:
-    """The state of a file or folder; of a folder only what may be source text, as pictures may be written into it."""
+    """Return the state of a file or folder; a folder's has only possible source files, not outputs."""
     try:
         status = os.stat(path)
         if stat.S_ISDIR(status.st_mode):
@@ -48,7 +47,7 @@ def stamp(path: Path | str) -> Stamp:
 
 
 def folder_names(path: Path | str, status: os.stat_result | None = None) -> tuple[str, ...]:
-    """Return the sorted names in a folder, of which `status` may be known; raises OSError."""
+    """Return the sorted names in a folder, whose `status` may be known; raises OSError."""
     status = status or os.stat(path)
     name, state = os.path.abspath(path), (status.st_mtime_ns, status.st_ino)
     known = _NAMES.get(name)
@@ -61,7 +60,7 @@ def folder_names(path: Path | str, status: os.stat_result | None = None) -> tupl
 
 
 def record_read(path: Path | str) -> None:
-    """Note a file or folder, before it is opened; the first read counts."""
+    """Record a file or folder before it is opened; the first read counts."""
     read = _READ.get()
     if read is not None and os.fspath(path) not in read:
         name = os.path.abspath(path)
@@ -70,7 +69,7 @@ def record_read(path: Path | str) -> None:
 
 
 def replay_reads(stamps: Stamps) -> None:
-    """Note the files that a kept result was made from."""
+    """Record the files from which a cached result was computed."""
     read = _READ.get()
     if read is not None:
         for path, state in stamps.items():
@@ -79,7 +78,7 @@ def replay_reads(stamps: Stamps) -> None:
 
 @contextmanager
 def track_reads() -> Iterator[dict[str, Stamp]]:
-    """Collect the reads in the block, also where it fails; a collection around it gets the same."""
+    """Collect the reads in the block, even if it fails; outer collections get them, too."""
     outer = _READ.get()
     read: dict[str, Stamp] = {}
     token = _READ.set(read)
@@ -93,12 +92,12 @@ def track_reads() -> Iterator[dict[str, Stamp]]:
 
 
 def modified(stamps: Stamps) -> list[Path]:
-    """The files that have changed, in the order they were read."""
+    """Return the files that have changed, in the order in which they were read."""
     return [Path(path) for path, state in stamps.items() if stamp(path) != state]
 
 
 def unchanged(stamps: Stamps) -> bool:
-    """Whether a result made from these files is still valid; taking it counts as reading them."""
+    """Return whether a result computed from these files is still valid; using it counts as reading them."""
     if modified(stamps):
         return False
     replay_reads(stamps)
@@ -106,14 +105,14 @@ def unchanged(stamps: Stamps) -> bool:
 
 
 class FileCache(Generic[T]):
-    """Results by key, each valid as long as the files it was made from; the least recently used goes first."""
+    """Results by key, each valid until its files change; the least recently used is dropped first."""
 
     def __init__(self, most: int = 2048) -> None:
         self._most = most
         self._entries: dict[Hashable, tuple[T, Stamps]] = {}
 
     def get(self, key: Hashable, make: Callable[[], T]) -> T:
-        """Return the result for a key; a `make` that raises is called again next time."""
+        """Return the result for a key; if `make` raises, it is called again next time."""
         entry = self._entries.pop(key, None)
         if entry is None or not unchanged(entry[1]):
             with track_reads() as files:

@@ -1,6 +1,6 @@
-"""What depends on the operating system: Linux in full, other POSIX systems as far as they have it.
+"""Everything that depends on the operating system: Linux fully, other POSIX systems as far as possible.
 
-Everything that a port to another system has to replace stands here. The rest of the project asks for it by these names.
+A port to another system needs to replace only this module.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ EGL, GL = "libEGL.so.1", "libGL.so.1"
 STDIN = "/dev/stdin"
 _PR_SET_PDEATHSIG = 1
 _CONTROL_GROUP = "/sys/fs/cgroup"
-_PACKAGES = {  # by the ID or ID_LIKE of os-release: the installer, and what brings EGL, GL and a software renderer
+_PACKAGES = {  # by ID or ID_LIKE of os-release: the installer, and the packages of EGL, GL and a software renderer
     "debian": ("apt install", {EGL: "libegl1", GL: "libgl1", "driver": "libgl1-mesa-dri"}),
     "fedora": ("dnf install", {EGL: "libglvnd-egl", GL: "libglvnd-glx", "driver": "mesa-dri-drivers"}),
     "rhel": ("dnf install", {EGL: "libglvnd-egl", GL: "libglvnd-glx", "driver": "mesa-dri-drivers"}),
@@ -32,7 +32,7 @@ _PACKAGES = {  # by the ID or ID_LIKE of os-release: the installer, and what bri
 
 
 def end_with_parent(parent: int) -> None:
-    """Let the system end this process when its parent ends, for whatever reason."""
+    """Let the system end this process when its parent ends for any reason."""
     if sys.platform == "linux":
         import ctypes  # takes 2 ms
 
@@ -48,14 +48,14 @@ def kill_session(process: int) -> None:
 
 
 def set_alarm(seconds: float) -> None:
-    """Let SIGALRM end this process after some seconds; 0 stops that."""
+    """Let SIGALRM end this process after some seconds; 0 cancels that."""
     signal.setitimer(signal.ITIMER_REAL, seconds)
 
 
 def limit_memory(private: int) -> None:
-    """Let this process have so many bytes of private memory and no core file.
+    """Limit the private memory of this process in bytes, and disable core files.
 
-    The address space is not limited: drivers reserve much of that and use little.
+    The address space is not limited, because drivers reserve much more than they use.
     """
     import resource  # not on every system
 
@@ -64,7 +64,7 @@ def limit_memory(private: int) -> None:
 
 
 def lock(file: IO[bytes]) -> bool:
-    """Lock an open file for this process, until it is closed; whether no other process has it."""
+    """Lock an open file for this process until it is closed; return whether no other process holds the lock."""
     import fcntl  # not on every system
 
     try:
@@ -76,7 +76,7 @@ def lock(file: IO[bytes]) -> bool:
 
 @contextmanager
 def memory_file() -> Iterator[tuple[str, IO[bytes]]]:
-    """Yield a path for libraries to write to, and that file open to read; a killed process leaves nothing behind."""
+    """Yield a path for libraries to write to, and the opened file; nothing is left if the process is killed."""
     if not hasattr(os, "memfd_create"):
         import tempfile  # takes 7 ms
 
@@ -89,7 +89,7 @@ def memory_file() -> Iterator[tuple[str, IO[bytes]]]:
 
 def processor() -> str:
     """Return the processor's name and its number of cores."""
-    import platform  # for reports alone
+    import platform  # only for reports
 
     try:
         lines = _text("/proc/cpuinfo").splitlines()
@@ -115,7 +115,7 @@ def _free_in_system() -> int | None:
 
 
 def _free_in_group() -> int | None:
-    """Return what is left of a control group's memory (version 2), None if it has no limit."""
+    """Return the remaining memory of the control group (version 2); None if it has no limit."""
     try:
         bound, used, counts = (_text(f"{_CONTROL_GROUP}/memory.{name}").strip() for name in ("max", "current", "stat"))
         cached = dict(line.split() for line in counts.splitlines())
@@ -130,12 +130,12 @@ def _text(file: str) -> str:
 
 
 def install_advice(missing: list[str]) -> str:
-    """Return how this system gets what is missing of `EGL`, `GL` and `driver`, a software renderer."""
+    """Return how to install the `missing` ones of `EGL`, `GL` and `driver` (a software renderer) on this system."""
     if sys.platform == "darwin":
         return "macOS ends at OpenGL 4.1; use a container or a virtual machine with Linux (docs/guide/other-systems.md)"
     if sys.platform == "win32":
         return "use the Windows Subsystem for Linux: wsl --install (docs/guide/other-systems.md)"
-    import platform  # for `doctor` alone
+    import platform  # only for `doctor`
 
     try:
         release = platform.freedesktop_os_release()

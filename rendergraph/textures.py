@@ -1,6 +1,6 @@
-"""Formats, what texels mean, and the description a texture is allocated from.
+"""Formats, semantics of texels, and descriptions of textures.
 
-Nothing here touches GL: a format knows its GL enum as a number so that `gl` needs no second table.
+Nothing here uses GL: a format has its GL enum as a number, so that `gl` needs no second table.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Kind = Literal["texture2d", "texture2d_array", "texture3d", "texture_cube", "buf
 MOST_SIDE = 16_384
 """Largest width or height of a picture or texture."""
 GLSL_SHAPES = {"texture2d": "2D", "texture2d_array": "2DArray", "texture3d": "3D", "texture_cube": "Cube"}
-"""Texture kinds to what GLSL appends to `sampler` and `image`."""
+"""Texture kind to the suffix of GLSL's `sampler` and `image`."""
 TEXTURE_KINDS: frozenset[str] = frozenset(GLSL_SHAPES)
 
 Family = Literal["float", "unorm", "snorm", "uint", "int", "depth", "depth_stencil"]
@@ -32,9 +32,9 @@ class Format(Struct, frozen=True):
         gl: the sized internal format's GL enum.
         components: channels per texel, 1 to 4.
         bytes: bytes per texel.
-        family: how the shader sees the channels; two formats of one family can stand for each other at a port.
-        view_class: formats of one class share storage through texture views (OpenGL 4.6, table 8.22); depth formats
-            are each their own class, for they never share storage with colour.
+        family: the type of channels in shaders; formats of one family are interchangeable at a port.
+        view_class: formats of one class can share storage through texture views (OpenGL 4.6, table 8.22); each depth
+            format is its own class, because depth never shares storage with colour.
         srgb: whether the sRGB curve is decoded on read and encoded on write.
     """
 
@@ -70,8 +70,8 @@ FORMATS: dict[str, Format] = {found.name: found for found in _formats()}
 
 
 class Semantic(Struct, frozen=True):
-    """The meaning of a port's texels: a word, a line with units and range, the space of directions or positions, and
-    the encoding of colours.
+    """The meaning of a port's texels: a name, a description with units and range, the space of directions or positions,
+    and the encoding of colours.
     """
 
     name: str
@@ -91,8 +91,8 @@ Normal = Semantic("normal", "Unit normal in world space.", space="world")
 Material = Semantic("material", "Metallic, roughness, occlusion and model data, 0 to 1.")
 Depth = Semantic("depth", "Window depth, 1 at the near plane to 0 at the far one or where nothing is.")
 LinearDepth = Semantic("linear_depth", "Distance along the view axis, -z in view space, metres.")
-ShadowMap = Semantic("shadow_map", "Window depth seen from lights, one layer a view.")
-Visibility = Semantic("visibility", "1 lit, 0 shadowed, one layer a shadowed light.")
+ShadowMap = Semantic("shadow_map", "Window depth seen from lights, one layer per view.")
+Visibility = Semantic("visibility", "1 lit, 0 shadowed, one layer per shadowed light.")
 Occlusion = Semantic("occlusion", "Ambient visibility: 1 open, 0 closed.")
 Reflections = Semantic(
     "reflections", "Radiance reflected to the viewer, scene-linear; alpha is confidence, 0 to 1.", encoding="linear"
@@ -100,11 +100,11 @@ Reflections = Semantic(
 Irradiance = Semantic("irradiance", "Irradiance of surfaces, scene-linear.", encoding="linear")
 Reflectance = Semantic("reflectance", "Fraction of light that is reflected, linear, 0 to 1.", encoding="linear")
 Luminance = Semantic("luminance", "Scene luminance, relative to white at 1.")
-ExposureGain = Semantic("exposure_gain", "Factor that brings scene radiance to the display's range; one texel.")
+ExposureGain = Semantic("exposure_gain", "Factor that scales scene radiance to the display's range; one texel.")
 IrradianceSH = Semantic("irradiance_sh", "L2 spherical harmonics of the environment's radiance.")
 EnvironmentMap = Semantic(
     "environment_map",
-    "Equirectangular radiance all around: +X in the middle, +Z at 3/4 of the width, +Y at v = 0.",
+    "Equirectangular environment radiance: +X in the middle, +Z at 3/4 of the width, +Y at v = 0.",
     encoding="linear",
 )
 Any = Semantic("any", "Whatever is connected.")
@@ -123,11 +123,11 @@ class Signature(Struct, frozen=True):
     Attributes:
         declaration: the GLSL declaration without a semicolon.
         arguments: the argument names in order, to forward them.
-        combine: the operator that joins several providers. With "" there is at most one, and without it no function:
-            shaders ask `HAS_<PORT>` before they call.
-        neutral: the GLSL value with no provider; with `combine=""` what shaders assume then.
+        combine: the operator that combines several providers. With "" there is at most one provider, and without a
+            provider no function: shaders must check `HAS_<PORT>` before the call.
+        neutral: the GLSL value without a provider; with `combine=""`, the value that shaders assume then.
         doc: what it returns.
-        texture: the semantic whose textures provide the same in screen space, one layer a light; None if there is none.
+        texture: the semantic of textures that provide the same in screen space, one layer per light, or None.
         also: further functions that the same file defines; only with `combine=""`.
     """
 
@@ -142,7 +142,7 @@ class Signature(Struct, frozen=True):
 
     @property
     def functions(self) -> tuple[Signature, ...]:
-        """It and the further functions."""
+        """This signature and those of the further functions."""
         return self, *self.also
 
 
@@ -162,8 +162,8 @@ EnvironmentLight = Signature(
     arguments=("direction", "lobe"),
     combine="+",
     neutral="vec3(0.0)",
-    doc="Radiance from around a world-space direction, averaged over a lobe: 0 to 1 that of GGX of this perceptual "
-    "roughness, seen along the normal; 2 the cosine lobe of a diffuse surface; below 0 a cone of so many radians.",
+    doc="Radiance around a world-space direction, averaged over a lobe: 0 to 1 is GGX with this perceptual "
+    "roughness, seen along the normal; 2 the cosine lobe of a diffuse surface; below 0 a cone of this many radians.",
 )
 
 Air = Signature(
@@ -172,7 +172,7 @@ Air = Signature(
     arguments=("position",),
     combine="",
     neutral="vec4(0.0, 0.0, 0.0, 1.0)",
-    doc="What lies between the camera and a world-space position: rgb in-scattered radiance, alpha transmittance.",
+    doc="Air between the camera and a world-space position: rgb in-scattered radiance, alpha transmittance.",
 )
 
 LightList = Signature(
@@ -181,8 +181,8 @@ LightList = Signature(
     arguments=("position",),
     combine="",
     neutral="LIGHT_COUNT",
-    doc="Number of lights that may reach a world-space position; called before `light_at`, so it may keep in a global "
-    "variable where their list begins.",
+    doc="Number of lights that may reach a world-space position; called before `light_at`, so it may store the "
+    "beginning of their list in a global variable.",
     also=(
         Signature(
             name="light_at",
@@ -190,7 +190,7 @@ LightList = Signature(
             arguments=("index",),
             combine="",
             neutral="index",
-            doc="Scene's index of a light of that list, counted from 0; indices ascend.",
+            doc="Index in the scene of a light of that list, counted from 0; indices ascend.",
         ),
     ),
 )
@@ -199,7 +199,7 @@ SIGNATURES: tuple[Signature, ...] = (ShadowLookup, EnvironmentLight, Air, LightL
 
 
 class Sampler(Struct, frozen=True):
-    """How a reader samples; two readers of one texture may differ, so this becomes a GL sampler object."""
+    """How a reader samples a texture; readers may differ, so this becomes a GL sampler object."""
 
     filter: Filter = "nearest"
     wrap: Wrap = "clamp"
@@ -209,10 +209,10 @@ class Sampler(Struct, frozen=True):
 
 
 class TextureDesc(Struct, frozen=True, gc=False):
-    """What a texture is allocated from; equal descriptions can share one texture.
+    """The description of a texture; textures with equal descriptions can share memory.
 
     Attributes:
-        kind: one of `TEXTURE_KINDS`; multisampled where `samples` is above 1.
+        kind: one of `TEXTURE_KINDS`; multisampled if `samples` is above 1.
         format: a name in `FORMATS`.
         width, height: texels of mip 0, each at least 1.
         layers: array layers; 6 for a cube, the depth of mip 0 for a 3D texture.
@@ -243,15 +243,15 @@ class TextureDesc(Struct, frozen=True, gc=False):
         return texels * self.samples * FORMATS[self.format].bytes
 
     def mip_size(self, mip: int) -> tuple[int, int]:
-        """Width and height of one level."""
+        """Return width and height of one level."""
         return max(1, self.width >> mip), max(1, self.height >> mip)
 
     def mip_layers(self, mip: int) -> int:
-        """Layers of one level, or its depth."""
+        """Return the layers of one level, or its depth."""
         return max(1, self.layers >> mip) if self.kind == "texture3d" else self.layers
 
     def lacks(self, mip: int | None, layer: int | None) -> str | None:
-        """The mip or layer that it does not have, as the end of a sentence that names it; None where it has them."""
+        """Return the mip or layer that does not exist, as the end of a sentence that names the texture, or None."""
         for name, number, count in (("mip", mip, self.mips), ("layer", layer, self.mip_layers(mip or 0))):
             if number is not None and number >= count:
                 return f"has no {name} {number}; it has {f'0 to {count - 1}' if count > 1 else 'only 0'}"
@@ -259,7 +259,7 @@ class TextureDesc(Struct, frozen=True, gc=False):
 
     @property
     def storage_class(self) -> tuple[object, ...]:
-        """Equal for textures that can share storage through views: the texel class, and everything but the format."""
+        """A key that is equal for textures that can share storage through views: texel class, size, mips and so on."""
         shape = self.kind, self.width, self.height, self.layers, self.mips, self.samples
         return FORMATS[self.format].view_class, *shape
 
@@ -292,7 +292,7 @@ class Layout(Struct, frozen=True, eq=False):
             raise TypeError(f"Layout '{self.name}' cannot hold {wrong}; available: {', '.join(_STD430)}")
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Layout) and self.glsl == other.glsl  # the order of fields counts
+        return isinstance(other, Layout) and self.glsl == other.glsl  # the order of fields matters
 
     def __hash__(self) -> int:
         return hash(self.name)
@@ -325,5 +325,5 @@ class BufferDesc(Struct, frozen=True):
 
 
 def full_mip_count(width: int, height: int, depth: int = 1) -> int:
-    """Levels down to a single texel."""
+    """Return the number of mip levels down to a single texel."""
     return max(width, height, depth).bit_length()

@@ -1,9 +1,9 @@
-"""Types as data: which values an annotation accepts, how a file's value converts, its words and its JSON Schema.
+"""Types as data: values that an annotation accepts, conversion of a file's values, descriptions and JSON Schemas.
 
-Annotations describe ports, steps, parameters and the keys of files alike. Metadata of an `Annotated` says more than a
-type can: `Range`, `Length`, `Known` and `Matching` restrict values, a text stands for the annotation in messages,
-`Brief` in tables, and `Converted` changes a file's value. `msgspec.convert` is not used: it knows neither functions nor
-unions of several tuples or classes, which ports take.
+Annotations describe ports, steps, parameters and the keys of files. Metadata of an `Annotated` adds to a type: `Range`,
+`Length`, `Known` and `Matching` restrict values, a text describes the annotation in messages, `Brief` in tables, and
+`Converted` changes a file's value. `msgspec.convert` is not used, because it does not support functions or unions of
+several tuples or classes, which ports take.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ T = TypeVar("T", bound=Struct)
 Schema: TypeAlias = "dict[str, Any]"
 
 LARGEST = 3.4028235e38
-"""The largest number of 32 bits; GPUs compute with those."""
+"""The largest 32-bit float, because GPUs compute with these."""
 MOST = 1e12
-"""Limit of numbers in files: products of a few larger ones would leave single precision. Messages do not mention it."""
+"""Limit of numbers in files: products of a few larger ones exceed single precision. Messages do not mention it."""
 
 
 class Range(Struct, frozen=True):
@@ -47,7 +47,7 @@ class Range(Struct, frozen=True):
 
     @property
     def mentioned(self) -> tuple[float | None, float | None]:
-        """The limits without those that any number in a file has."""
+        """The limits without those of every number in a file."""
         return None if self.low == -MOST else self.low, None if self.high == MOST else self.high
 
     @property
@@ -55,7 +55,7 @@ class Range(Struct, frozen=True):
         return self.low is not None and self.high is not None and self.low > self.high
 
     def violation(self, value: float) -> str | None:
-        """What a number that lies outside must be; None for one that lies inside."""
+        """Return what a number outside the limits must be; None for one inside."""
         if not abs(value) <= LARGEST:
             if value == math.inf and self.infinite:
                 return None
@@ -113,19 +113,19 @@ class Matching(Struct, frozen=True):
 
 
 class Brief(Struct, frozen=True):
-    """What a type is called in a table."""
+    """The name of a type in tables."""
 
     text: str
 
 
 class Converted(Struct, frozen=True):
-    """A function that an accepted value of a file goes through."""
+    """A function that converts an accepted value of a file."""
 
     by: Callable[[Any], Any]
 
 
 class JsonSchema(Struct, frozen=True):
-    """A function that gives the JSON Schema, where the type's own offers too little to an editor."""
+    """A function that returns the JSON Schema, if the type's own is not enough for editors."""
 
     make: Callable[[], Schema]
 
@@ -138,13 +138,13 @@ def _rules(annotation: Any, *kinds: Any) -> list[Any]:
 
 
 def fits(value: object, annotation: Any) -> bool:
-    """Whether an annotation accepts a value; a float may be written as a whole number, a bool is not a number."""
+    """Return whether an annotation accepts a value; a float may be written as an integer, a bool is not a number."""
     return test_of(annotation)(value)
 
 
 @cache
 def test_of(annotation: Any) -> Callable[[Any], bool]:
-    """Return the function that tells whether an annotation accepts a value, for repeated use: see `fits`."""
+    """Return a function that tests whether an annotation accepts a value, for repeated use; see `fits`."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if annotation is Any:
         return lambda value: True
@@ -183,7 +183,7 @@ def test_of(annotation: Any) -> Callable[[Any], bool]:
 
 @cache
 def conversion_to(annotation: Any) -> Callable[[Any], Any]:
-    """Return the function that makes a file's value one of an annotation: a list a tuple, a whole number a float."""
+    """Return a function that converts a file's value to an annotation: a list to a tuple, an integer to a float."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         steps = [conversion_to(annotation.__origin__), *(rule.by for rule in _rules(annotation, Converted))]
@@ -214,9 +214,9 @@ _JSON = {bool: "boolean", int: "integer", float: "number", str: "string", types.
 
 
 def words_for(annotation: Any, limits: Range = Range(), *, file: bool = False) -> str:
-    """Return what an annotation accepts, with limits of each number: `a whole number from 1 to 64`.
+    """Return a description of what an annotation accepts, with limits: `a whole number from 1 to 64`.
 
-    `file` asks for what a YAML file may give, instead of a Python value.
+    `file` describes values in a YAML file, instead of Python values.
     """
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
@@ -260,7 +260,7 @@ def _row_words(origin: Any, arguments: tuple[Any, ...], file: bool) -> str:
 
 
 def brief(annotation: Any) -> str:
-    """Return a type as a table shows it: `number`, `[3 numbers]`, `neutral | aces`."""
+    """Return a type's name for tables: `number`, `[3 numbers]`, `neutral | aces`."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return next((rule.text for rule in _rules(annotation, Brief)), "") or brief(annotation.__origin__)
@@ -279,7 +279,7 @@ def brief(annotation: Any) -> str:
 
 
 def json_schema(annotation: Any) -> Schema:
-    """Return the JSON Schema (draft 07, which editors read) of what a file may give; any value for other types."""
+    """Return the JSON Schema (draft 07, which editors support) of a file's values; any value for other types."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         if given := _rules(annotation, JsonSchema):
@@ -305,20 +305,20 @@ def json_schema(annotation: Any) -> Schema:
 
 
 def hint_for(value: object, annotation: Any) -> str:
-    """Return what a file's value that does not fit was most likely meant to be, as the end of a message."""
+    """Return a suggestion for a file's value that does not fit, as the end of a message."""
     parts = list(parts_of(annotation))
     if isinstance(value, str):
         return suggestion(value, [choice for part in parts for choice in _choices(part)], most=0)
     numbers: list[Any] = [entry for entry in _entries(value) if fits(entry, float)]
     is_too_large = any(abs(entry) > MOST for entry in numbers) and len(numbers) == len(_entries(value))
-    return f"; numbers end at {MOST:.3g}" if is_too_large and float in parts else ""
+    return f"; the largest number is {MOST:.3g}" if is_too_large and float in parts else ""
 
 
 # --- what is wrong with Python values --------------------------------------------------------------------------------
 
 
 def quoted(value: object) -> str:
-    """Return a Python value for a message: as it is written, and not too long; a port by its name."""
+    """Return a Python value for a message, shortened; a port by its name."""
     name = getattr(value, "name", "")
     if isinstance(value, Struct) and isinstance(name, str) and name:
         return f"the {type(value).__name__} '{name}'"
@@ -327,7 +327,7 @@ def quoted(value: object) -> str:
 
 
 def mistakes_in(what: str, value: object, annotation: Any, subject: str = "") -> Iterator[Problem]:
-    """Yield what is wrong with a value, or with each entry of a mapping; messages name it `what`."""
+    """Yield the mistakes in a value, or in each entry of a mapping; messages name it `what`."""
     if fits(value, annotation):
         return
     parts = list(parts_of(annotation))
@@ -355,7 +355,7 @@ def mistakes_in(what: str, value: object, annotation: Any, subject: str = "") ->
 
 
 def mistakes_of(thing: Struct, who: str, subject: str = "") -> Iterator[Problem]:
-    """Yield what is wrong with the fields of a struct; messages name it `who`, the default subject is the field."""
+    """Yield the mistakes in the fields of a struct; messages name it `who`, the default subject is the field."""
     for name, default, hint, _ in _fields(type(thing)):
         value = getattr(thing, name)
         if value is not default:
@@ -364,7 +364,7 @@ def mistakes_of(thing: Struct, who: str, subject: str = "") -> Iterator[Problem]
 
 @cache
 def _fields(kind: type[Struct]) -> tuple[tuple[str, Any, Any, Callable[[Any], bool]], ...]:
-    """Names, defaults, annotations and their tests; `msgspec.structs.fields` would work all types out once more."""
+    """Return names, defaults, annotations and their tests; `msgspec.structs.fields` would resolve all types again."""
     hints: dict[str, Any] = {}
     for base in reversed(kind.__mro__):
         hints |= _annotations_of(base)
@@ -376,12 +376,12 @@ def _fields(kind: type[Struct]) -> tuple[tuple[str, Any, Any, Callable[[Any], bo
 
 @cache
 def _annotations_of(kind: type) -> dict[str, Any]:
-    """The annotations of a class alone, which `typing` works out again for each class that inherits them."""
+    """Return the annotations of one class, which `typing` would resolve again for each class that inherits them."""
     return get_annotations(kind, eval_str=True)
 
 
 def validated(thing: T, who: str = "") -> T:
-    """Return a struct whose fields all fit their annotations; `Misuse` if one does not."""
+    """Return a struct whose fields all fit their annotations; raise `Misuse` if one does not."""
     for name, default, _, test in _fields(type(thing)):
         value = getattr(thing, name)
         if value is not default and not test(value):
@@ -391,7 +391,7 @@ def validated(thing: T, who: str = "") -> T:
 
 
 def parts_of(annotation: Any) -> Iterator[Any]:
-    """Yield the members of a union and the entries of a tuple, without metadata except the words of a table."""
+    """Yield the members of a union and the entries of a tuple, without metadata except `Known`."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated and not _rules(annotation, Known):
         yield from parts_of(annotation.__origin__)
@@ -403,7 +403,7 @@ def parts_of(annotation: Any) -> Iterator[Any]:
 
 
 def is_numeric(annotation: Any) -> bool:
-    """Whether an annotation accepts only numbers and tuples of numbers, between which there are others."""
+    """Return whether an annotation accepts only numbers and tuples of numbers, which can be interpolated."""
     return all(part is float for part in parts_of(annotation))
 
 
@@ -420,9 +420,9 @@ def _entries(value: object) -> Sequence[object]:
 
 @cache
 def accepts(annotation: Any, kind: type) -> bool:
-    """Whether an annotation, or an entry of it, accepts instances of a class."""
+    """Return whether an annotation, or an entry of it, accepts instances of a class."""
     return kind in (annotation, get_origin(annotation)) or any(accepts(part, kind) for part in get_args(annotation))
 
 
 hints_of: Callable[[Any], dict[str, Any]] = cache(partial(get_type_hints, include_extras=True))
-"""The annotations of a class or function by name, worked out once."""
+"""Returns the annotations of a class or function by name; cached."""

@@ -1,3 +1,3 @@
-"""Which rendergraph this is."""
+"""The version of rendergraph."""
 
 __version__ = "0.1.0"

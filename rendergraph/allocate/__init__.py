@@ -1,8 +1,8 @@
-"""Schedule to ResourcePlan: lifetimes, physical textures, aliases, bytes, lower bound.
+"""Allocate a Schedule's resources, giving a ResourcePlan: lifetimes, physical textures, aliases, bytes, lower bound.
 
 Textures share memory as a whole, in three tiers: `descriptor`, equal descriptions; `view`, equal texel classes through
-texture views; and `heap`, blocks of memory for textures of any description. Within a class lifetimes are intervals, so
-giving each the first free texture in order of time uses as few textures as are ever alive at once, which is optimal.
+texture views; and `heap`, blocks of memory for textures of any description. Within a class, lifetimes are intervals, so
+greedy allocation in order of time needs only as many textures as are ever alive at once, which is optimal.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from rendergraph.schedule.model import storage_class
 from rendergraph.steps import Resource
 from rendergraph.textures import BufferDesc, TextureDesc
 
-# Above this, placing bytes takes longer than its figure is worth.
+# Above this, placement in a heap takes too long for its benefit.
 MOST_PLACED = 2_000
 
 Tier: TypeAlias = Literal["descriptor", "view", "heap"]
@@ -41,11 +41,11 @@ class Physical(Struct, frozen=True, gc=False):
     """One texture or buffer that is allocated.
 
     Attributes:
-        desc: what it is created from; members of another format of the same texel class use a view of it. Of a block
-            the largest member's.
-        members: resources that live in it, in time order; a history resource has two physicals to itself.
-        bytes: by formula; 0 for the scene's.
-        block: whether it is plain memory, in which members of different texel classes are textures of their own.
+        desc: its description; members of another format in the same texel class use a view of it. For a block, the
+            largest member's.
+        members: resources that live in it, in time order; a history resource has two physicals of its own.
+        bytes: by formula; 0 for resources of the scene.
+        block: whether it is plain memory, in which members of different texel classes are separate textures.
     """
 
     index: int
@@ -59,11 +59,11 @@ class MemoryFigures(Struct, frozen=True):
     """The figures of `run --json` and `plan --json`.
 
     Attributes:
-        no_reuse_bytes: with a texture of its own for every resource.
+        no_reuse_bytes: bytes if every resource had its own texture.
         lower_bound_bytes: no legal order has a lower peak of live bytes.
         proven: an order was found whose peak is that bound.
-        tier: how textures share: `view` only if some share needs a view, `heap` if some lie in a block.
-        next_tier: the next way of sharing that saves bytes, if any.
+        tier: how textures share: `view` only if any needs a view, `heap` if any lie in a block.
+        next_tier: the next tier that saves bytes, if any.
     """
 
     no_reuse_bytes: int
@@ -85,7 +85,7 @@ class ResourcePlan(Struct, frozen=True, dict=True):
 
     Attributes:
         placement: resource id to the indices of its physicals (two for history, else one).
-        released: step position to the resources that are dead after it (for the poison mode).
+        released: step position to the resources whose lifetimes end there (for the poison mode).
     """
 
     schedule: Schedule
@@ -115,16 +115,16 @@ class ResourcePlan(Struct, frozen=True, dict=True):
         return _reasons(self)
 
     def bytes(self, id: str) -> int:
-        """Return the bytes of a resource by formula: of both textures if it has two; 0 for the scene's."""
+        """Return the bytes of a resource by formula, with both textures of a history; 0 for the scene's."""
         resource = self.resources[id]
         return 0 if resource.role == "scene" else resource.desc.bytes * len(self.placement[id])
 
 
 def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True, heap: bool = False) -> ResourcePlan:
-    """Give every resource of a schedule memory.
+    """Allocate memory for every resource of a schedule.
 
     Args:
-        alias: let resources that are never alive together share memory.
+        alias: let resources with disjoint lifetimes share memory.
         views: let formats of one texel class share through texture views.
         heap: let textures of any description share blocks of memory, if that takes fewer bytes.
     """
@@ -138,7 +138,7 @@ def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True, heap
     by_desc = _colour(shareable, lifetimes, descs, descs)
     alike = len(set(classes.values())) == len(set(descs.values()))  # each class has one description
     by_class = by_desc if alike else _colour(shareable, lifetimes, descs, classes)
-    better: list[tuple[Tier, Groups]] = []  # tiers above the one asked for
+    better: list[tuple[Tier, Groups]] = []  # tiers above the requested one
     if not alias:
         groups = [[id] for id in shareable]
         better = [("descriptor", by_desc), ("view", by_class)]
@@ -153,7 +153,7 @@ def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True, heap
             better.append(("heap", blocks))
         elif _bytes(blocks, sizes) < _bytes(groups, sizes):
             groups = blocks
-    # With a texture of its own for everything, history has two in any order.
+    # Without sharing, history takes two textures in any order.
     copies = schedule.history_copies if alias else dict.fromkeys(schedule.history_copies, 2)
     physicals, placement = _physicals(schedule, groups, copies, sizes, classes)
     released: dict[int, list[str]] = defaultdict(list)
@@ -190,14 +190,14 @@ def _lifetimes(schedule: Schedule) -> dict[str, Lifetime]:
 
 
 Groups = list[list[str]]
-"""Resources that live in one physical each, in time order."""
+"""The resources of each physical, in time order."""
 
 Kinds: TypeAlias = Mapping[str, object]
-"""What a resource has in common with those that it can share with, by id."""
+"""By id, a key that resources have in common if they can share."""
 
 
 def _colour(ids: Iterable[str], lifetimes: Mapping[str, Lifetime], descs: Kinds, kinds: Kinds) -> Groups:
-    """Colour intervals within each kind, preferring a free texture of the same description, then the oldest."""
+    """Colour the interval graph of each kind; prefer a free texture with the same description, then the oldest."""
     groups: Groups = []
     free: dict[object, list[int]] = defaultdict(list)  # by kind: indices into groups, lowest first
     free_exact: dict[object, list[int]] = defaultdict(list)  # by description
@@ -233,7 +233,7 @@ def _take(free: list[int], taken: Sequence[bool], groups: Groups, descs: Kinds, 
 
 
 def _fewest_views(ids: Iterable[str], classes: Kinds, by_desc: Groups, by_class: Groups) -> Groups:
-    """Return the sharing by class if it saves bytes, else that by description: needless views are clutter."""
+    """Return the sharing by class if it saves bytes, else that by description, to avoid needless views."""
 
     def kinds(groups: Groups) -> dict[object, Groups]:
         table: dict[object, Groups] = defaultdict(list)
@@ -360,7 +360,7 @@ def _reasons(plan: ResourcePlan) -> dict[str, str]:
 
 
 def _alike(plan: ResourcePlan) -> tuple[Kinds, str]:
-    """Return what textures that can share have in common, and the words for it."""
+    """Return what textures that can share have in common, and a phrase for it."""
     descs = {id: resource.desc for id, resource in plan.resources.items()}
     if plan.heap:
         return {id: isinstance(desc, TextureDesc) or desc for id, desc in descs.items()}, "is there"

@@ -1,8 +1,8 @@
-"""Assigns textures of any description to shared blocks of memory.
+"""Assign textures of any description to shared blocks of memory.
 
 A block is as large as its largest member, and all members begin at its start: drivers ignore other offsets
-(docs/decisions/memory-objects.md). So this is interval colouring with weights, the sum over colours of the largest
-weight, which is NP-hard; largest first is within 1 % of the optimum on most small cases, and restarts do the rest.
+(docs/decisions/memory-objects.md). This is weighted interval colouring, which minimises the sum over colours of the
+largest weight and is NP-hard; largest first is within 1 % of the optimum on most small cases, and restarts improve it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from functools import lru_cache
 
 from msgspec import Struct
 
-# Comparisons of pairs, not seconds: the same blocks on every machine. 40 textures get 6 restarts, 10 get 100.
+# In comparisons of pairs, so that all machines find the same blocks. 40 textures get 6 restarts, 10 get 100.
 WORK = 10_000
 RESTARTS = 100
 
@@ -26,19 +26,19 @@ class HeapItem(Struct, frozen=True, gc=False):
     kind: Hashable = None
 
 
-@lru_cache(64)  # most changes of a pipeline leave what is placed what it was
+@lru_cache(64)  # most changes of a pipeline do not change the items
 def share_blocks(items: tuple[HeapItem, ...]) -> tuple[tuple[int, ...], ...]:
-    """Return the numbers of the items in each block, in time order, so that the blocks have few bytes.
+    """Return the numbers of the items in each block, in time order, with few bytes in total.
 
-    Largest first, each where the block grows least; of equal blocks one with its kind, then the tightest. Then seeded
-    restarts with perturbed sizes, until none can be better.
+    Largest first, each into the block that grows least; ties go to a block with its kind, then to the tightest. Then
+    seeded restarts with perturbed sizes, until the bound is reached.
     """
     numbers = range(len(items))
     alive = [(1 << item.last + 1) - (1 << item.first) for item in items]  # a bit for each position
     best, least = _placed(items, alive, sorted(numbers, key=lambda n: (-items[n].bytes, items[n].first, n)))
     bound = least_bytes(items)
     if least > bound:
-        import random  # most orders are the best at once
+        import random  # the first order is usually optimal
 
         chooser = random.Random(0)
         for _ in range(min(RESTARTS, WORK // max(1, len(items)) ** 2)):
@@ -52,7 +52,7 @@ def share_blocks(items: tuple[HeapItem, ...]) -> tuple[tuple[int, ...], ...]:
 
 
 def least_bytes(items: Sequence[HeapItem]) -> int:
-    """Return bytes that no blocks are below: the n-th largest block holds the n-th largest item of every moment."""
+    """Return a lower bound on bytes: the n-th largest block must hold the n-th largest item at every moment."""
     most = [0] * len(items)
     ordered = sorted([(item.bytes, item.first, item.last) for item in items], reverse=True)
     for now in {item.first for item in items}:
@@ -64,7 +64,7 @@ def least_bytes(items: Sequence[HeapItem]) -> int:
 def _placed(items: Sequence[HeapItem], alive: Sequence[int], order: Sequence[int]) -> tuple[list[list[int]], int]:
     blocks: list[list[int]] = []
     sizes: list[int] = []
-    taken: list[int] = []  # of each block the positions at which one of its items is alive
+    taken: list[int] = []  # per block, the positions at which one of its items is alive
     kinds: list[set[object]] = []
     for number in order:
         bytes, kind, now = items[number].bytes, items[number].kind, alive[number]

@@ -1,4 +1,4 @@
-"""Tools for plugin authors: start a node from a template, and check one in a process of its own."""
+"""Tools for plugin authors: start a node from a template, and check a node in a separate process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Check a node in a process with limits, so that whatever its code does ends in a message.
+"""Check a node in a process with limits, so that every failure of its code becomes a message.
 
 The limits were measured with Mesa's llvmpipe on two cores: a context maps 0.75 GB of address space and writes to
 0.15 GB of it, `forward` maps 0.83 GB and writes to 0.24 GB. The limit is therefore on memory that can be written
@@ -33,10 +33,10 @@ from rendergraph.system import limit_memory
 
 _ERRORS = {1: RenderError, 3: InputError, 5: DeviceError}
 _STARTUP_SECONDS = 20.0
-"""For what is not the node's: starting Python, importing the framework, opening a context."""
+"""Seconds for starting Python, importing the framework and opening a context."""
 _LONGEST_MESSAGE = 16 << 20
 _OUTPUT_BYTES = 4096
-"""Of what the node prints, from its end: it may print for ever."""
+"""Characters kept from the end of the node's output, which may be endless."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def check_node(
 ) -> Report:
     """Examine the node of a file in a child process; geometry nodes render `scene`, a shipped name or a file.
 
-    An InputError says that it cannot be loaded, ends or crashes its process, hangs, or needs too much memory.
+    An InputError reports that it cannot be loaded, ends or crashes its process, hangs, or needs too much memory.
     """
     if file.suffix not in (".py", *SHADERS) or file.is_dir():
         kinds = f"a Python module or a shader file ({', '.join(SHADERS)})"
@@ -66,7 +66,7 @@ def check_node(
         "scene": str(Path(scene).resolve()) if scene and re.search(r"[./]", scene) else scene,
         "memory": limits.memory,
     }
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:  # the child may not come to remove it
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:  # the child may die before it removes it
         check = _Check(arguments, limits, folder)
         try:
             return check.report()
@@ -104,14 +104,14 @@ class _Check:
                     if (found := _problems(problems)) is not None:
                         return Report(node, tuple(variants), found)
                 case {"mistake": str(text)}:
-                    raise RuntimeError(text)  # ours
+                    raise RuntimeError(text)  # an internal error
                 case {"failed": [*problems], "exit_code": int(code)}:
                     if found := _problems(problems):
                         raise _ERRORS.get(code, RenderError)(found)
         raise InputError(self._exit_problem())
 
     def _messages(self) -> Iterator[object]:
-        """Yield messages until the process ends or closes its pipe; raises InputError where a stage takes too long."""
+        """Yield messages until the process ends or closes its pipe; raise InputError if a stage takes too long."""
         assert self._stdout is not None
         pipe, output = self._child.pipe.fileno(), self._stdout.fileno()
         sources, rest = {pipe, output}, b""
@@ -133,7 +133,7 @@ class _Check:
             if time.monotonic() >= end:
                 raise InputError(self._timeout_problem())
             if not ready and self._process.poll() is not None:
-                return  # a process that it has started may still hold the pipe
+                return  # a process that the child started may still hold the pipe
 
     def _seconds(self) -> float:
         limits = {"import": self._limits.import_seconds, "pass": self._limits.pass_seconds}
@@ -156,7 +156,7 @@ class _Check:
     def _exit_problem(self) -> Problem:
         try:
             status = self._process.wait(self._seconds())
-        except subprocess.TimeoutExpired:  # it has closed its pipe and goes on
+        except subprocess.TimeoutExpired:  # it closed its pipe but is still running
             return self._timeout_problem()
         lines = self._output.decode("utf-8", "replace").strip().splitlines()
         last = f"; its last output: {lines[-1][:200]}" if lines else ""
@@ -173,7 +173,7 @@ class _Check:
 
 
 def _decode(line: bytes) -> object:
-    """Return the child's message; None for what the node itself has written into the pipe."""
+    """Return the child's message; None for output that the node itself wrote into the pipe."""
     try:
         return json.loads(line)
     except (ValueError, RecursionError):
@@ -191,10 +191,10 @@ def _problems(entries: Sequence[Any]) -> tuple[Problem, ...] | None:
 
 
 def main(pipe: int, file: str, plugins: Sequence[str], scene: str | None, memory: int, trace: str) -> None:
-    """Set the limits, examine a node, and report through the pipe as lines of JSON: what the child process does.
+    """Set the limits, examine a node, and report through the pipe as lines of JSON; runs in the child process.
 
-    It announces each stage, so that the parent knows what was running when no more messages come; the fault handler
-    writes the line to the file `trace`.
+    It announces each stage, so that the parent knows what was running when messages stop; the fault handler writes
+    the line to the file `trace`.
     """
     limit_memory(memory)
     traces = open(trace, "wb", buffering=0)  # noqa: SIM115  # until the process ends
@@ -215,7 +215,7 @@ def main(pipe: int, file: str, plugins: Sequence[str], scene: str | None, memory
 
     path = Path(file)
     try:
-        from rendergraph.authoring.examine import examine_file  # what fails here is reported, too
+        from rendergraph.authoring.examine import examine_file  # a failing import is reported, too
 
         report = examine_file(path, list(map(Path, plugins)), scene, lambda stage, what: send(stage=stage, what=what))
         problems = [_as_json(problem) for problem in report.problems]
@@ -223,7 +223,7 @@ def main(pipe: int, file: str, plugins: Sequence[str], scene: str | None, memory
     except RendergraphError as error:
         found = [_out_of_memory(path, memory, error) or problem for problem in error.problems]
         send(failed=[_as_json(problem) for problem in dict.fromkeys(found)], exit_code=error.exit_code)
-    except BaseException as error:  # whatever third-party code can raise, and our own mistakes
+    except BaseException as error:  # anything that third-party code raises, and internal errors
         problem, place = _out_of_memory(path, memory, error), source_location(error, path)
         if problem is None and place is not None:
             problem = Problem("RG450", f"it raises {describe_error(error)}", place)
@@ -231,7 +231,7 @@ def main(pipe: int, file: str, plugins: Sequence[str], scene: str | None, memory
             send(failed=[_as_json(problem)], exit_code=3)
         else:
             send(mistake="".join(traceback.format_exception(error)))
-    leave(0)  # without exit handlers and threads of the node
+    leave(0)  # skips the node's exit handlers and threads
 
 
 def _as_json(problem: Problem) -> Any:

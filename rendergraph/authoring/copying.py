@@ -17,10 +17,10 @@ _RELATIVE = re.compile(r"^(\s*from )(\.+)([\w.]*)", re.MULTILINE)
 
 
 def copy_shipped(name: str, where: Path = Path()) -> NewNode:
-    """Write what is shipped by that name into a folder; `pipeline:`, `scene:` or `node:` before it says which.
+    """Copy the shipped item of a name into a folder; the prefix `pipeline:`, `scene:` or `node:` selects the kind.
 
-    A node becomes the type `my_NAME`, with its own shaders and what they include from beside them; what it shares with
-    other nodes, it imports. If a file exists already, nothing is written.
+    A node becomes the type `my_NAME`, with its own shaders and their local includes; it imports code that it shares
+    with other nodes. If a file exists already, nothing is written.
     """
     kind, colon, rest = name.partition(":")
     word, catalog = rest or kind, Catalog.discover()
@@ -61,7 +61,7 @@ def _node(node_type: NodeType) -> tuple[dict[str, bytes], list[str]]:
 
     text = node_type.file.read_text(encoding="utf-8")
     files = {f"{name}{node_type.file.suffix}": text if node_type.is_shader else _RELATIVE.sub(absolute, text)}
-    default = f"{own}.frag"  # a name that the module does not mention follows that of the type
+    default = f"{own}.frag"  # a shader that the module does not name is named after the type
     waiting = list(dict.fromkeys([*_SHADER.findall(text), default]))
     while waiting:
         shader = waiting.pop()

@@ -35,7 +35,7 @@ def examine_file(file: Path, plugins: Sequence[Path], scene: str | None, on_stag
 
 
 def find_node(file: Path, plugins: Sequence[Path] = ()) -> NodeType:
-    """Return the type that a file defines: of an installed package, of a plugin's folders, or by itself."""
+    """Return the type that a file defines, as part of an installed package or of a plugin's folders, or alone."""
     file = file.resolve()
     catalog = Catalog.discover(plugins)
     if file.stem in catalog:
@@ -48,11 +48,11 @@ def find_node(file: Path, plugins: Sequence[Path] = ()) -> NodeType:
     except InputError as error:
         if any(problem.code != "RG493" for problem in error.problems):
             raise
-        return Catalog.discover(named, installed=False).get(file.stem)  # the installed one is an older copy of it
+        return Catalog.discover(named, installed=False).get(file.stem)  # the installed copy is older
 
 
 def _plugin_of(file: Path) -> Path:
-    """Return what `--plugin` would name: the folder above `nodes/` and `shaders/`, else the file."""
+    """Return the path for `--plugin`: the folder above `nodes/` and `shaders/`, or else the file."""
     for folder in file.parents:
         if folder.name == "nodes" and (folder.parent / "shaders").is_dir():
             return folder.parent
@@ -74,9 +74,9 @@ def examine(
         for variant in variants(node.cls):
             on_stage("pass", variant.name or "default")
             check.run(variant, renders(variant))
-        discards = any(problem.code == "RG446" for problem in node.warnings)  # that says the same as RG454
+        discards = any(problem.code == "RG446" for problem in node.warnings)  # RG446 reports the same as RG454
         problems += [problem for problem in check.close() if not (discards and problem.code == "RG454")]
-    if check.tried and not any(problem.severity == "error" for problem in problems):  # else nothing may have run
+    if check.tried and not any(problem.severity == "error" for problem in problems):  # otherwise nothing may have run
         for name in _unused(node, check.active, check.files):
             text = f"'{name}' is declared, but no shader program uses it, or it has no effect there"
             problems.append(Problem("RG455", text, declaration_of(node.cls, node.file, name), severity=severity))
@@ -100,7 +100,7 @@ def _declared(node: NodeType) -> Iterator[Problem]:
 
 
 def doc_problems(cls: type[Node]) -> Iterator[Problem]:
-    """Yield what is wrong with the docs of a class, its ports and parameters: each is one line that ends in a stop."""
+    """Yield mistakes in the docs of a class, its ports and parameters: each must be one line that ends in '.'."""
     first = (cls.__doc__ or "").strip().partition("\n")[0]
     if not first:
         yield Problem("RG490", "has no docs")
@@ -149,7 +149,7 @@ def _shader_text(file: Path, inherited: tuple[Path, ...]) -> str:
     includes = Includes(shared_includes())
     origins = includes.expand(file, root=file.parent, versions=True, inherited=inherited).origins
     files = dict.fromkeys(origin.file for origin in origins if origin.file is not None)
-    return "\n".join(strip_comments(read_text(one)) for one in files)  # `#include <CURVE>` with them
+    return "\n".join(strip_comments(read_text(one)) for one in files)  # also for `#include <CURVE>`
 
 
 def _python_text(node: NodeType) -> str:

@@ -1,8 +1,8 @@
-"""The harness of a node that is checked: sources for its inputs, and readers for outputs that no picture file holds.
+"""The harness for checking a node: sources for its inputs, and readers for outputs that picture files cannot hold.
 
-Each source is a node whose class and shader are made from the port that it feeds. Its texture holds a smooth pattern of
-values that the port's semantic allows, and carries the camera's view and the scene's first light, so that it has all
-that a reader may need.
+Each source is a node whose class and shader are generated from the port that it feeds. Its texture holds a smooth
+pattern of values that the port's semantic allows, and carries the camera's view and the scene's first light, so that it
+has everything that a reader may need.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from rendergraph.ports import Samples
 from rendergraph.textures import FORMATS, TEXTURE_KINDS, TextureDesc
 
 SIZE = (37, 23)
-"""Of the picture: small, and not a multiple of the size of work groups."""
+"""Size of the picture: small, and not a multiple of the work group size."""
 
 _VALUES = {  # by semantic, of `vec2 at` from 0 to 1 and `float wave` from 0 to 1
     "radiance": "vec4(4.0 * wave * at, 2.0 * wave, 1.0)",
@@ -127,8 +127,8 @@ def _source(name: str, port: api.Input | api.InOut, folder: Path, samples: Sampl
     if port.kind == "buffer":
         made = api.Output(api.Any, kind="buffer", bytes=_BUFFER_BYTES, doc="Zeros.")
         return _node("Zeros", made=made, record=lambda self, steps: steps.clear(self.made))
-    assert port.kind != "function"  # whose semantic is a signature
-    assert port.kind != "scene"  # which is its own source
+    assert port.kind != "function"  # its semantic is a signature
+    assert port.kind != "scene"  # the scene is its own source
     meaning = api.Radiance if semantic is None or semantic.name == "any" else semantic
     given = port.format if isinstance(port, api.InOut) and isinstance(port.format, str) else None
     image = isinstance(port, api.Input) and port.use == "image"
@@ -182,7 +182,7 @@ def _camera(port: str, count: int = 1) -> Any:
 
 
 def _function_source(signature: api.Signature, folder: Path) -> type[api.Node]:
-    """Return a node whose function is neutral where a texture can replace it, and else varies with each argument."""
+    """Return a node whose function is neutral if a texture can replace it, and otherwise varies with each argument."""
     shader = f"{signature.name}_fed.glsl"
     lines = [f"{each.declaration} {{ return {_varied(each)}; }}\n" for each in signature.functions]
     (folder / shader).write_text("".join(lines), encoding="utf-8")
@@ -203,7 +203,7 @@ def _varied(signature: api.Signature) -> str:
 
 
 def _reader(name: str, port: api.Port, folder: Path) -> type[api.Node] | None:
-    """Return the class of a node that turns an output into a texture; None where it is one."""
+    """Return the class of a node that turns an output into a texture; None if the output is a texture."""
     value = api.Output(api.Any, format="rgba32f", doc="The values.")
     if isinstance(port, api.Function):
         shader = f"use_{name}.frag"

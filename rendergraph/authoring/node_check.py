@@ -1,4 +1,4 @@
-"""Render a node in each variant, and detect everything that it does wrong."""
+"""Render a node in each variant and detect its mistakes."""
 
 from __future__ import annotations
 
@@ -56,10 +56,10 @@ class NodeCheck:
         self.type, self.folder, self.scene = node, folder, scene
         self.tried: list[str] = []
         self.active: set[str] = set()
-        self.keywords: dict[tuple[tuple[str, int], str], bool] = {}  # those of steps: whether a program uses them
+        self.keywords: dict[tuple[tuple[str, int], str], bool] = {}  # keywords of steps: whether a program uses them
         self.files: set[Path] = set()
-        self._problems: dict[Problem, list[str]] = {}  # with the variants that have them
-        self._written: set[str] = set()  # outputs that some variant has
+        self._problems: dict[Problem, list[str]] = {}  # with the variants that cause them
+        self._written: set[str] = set()  # outputs that exist in some variant
         self._avoided: set[str] = set()  # optional inputs of a base class with which the node fails
         self.device: Device = open_device()
         flush_deleted_programs(self.device)
@@ -93,7 +93,7 @@ class NodeCheck:
             self._written |= set(variant.outputs)
 
     def _report_failure(self, variant: NodeVariant, error: RendergraphError) -> None:
-        """Report the problems of a variant that fails; as warnings where it works without an inherited optional input.
+        """Report the problems of a variant that fails; as warnings if it works without an inherited optional input.
 
         A plugin author's class need not work with every optional input of its base.
         """
@@ -105,7 +105,7 @@ class NodeCheck:
         if unfit is None:
             for problem in error.problems:
                 self._report(self._at_author(problem, error))
-        elif not variant.params or own & variant.params.keys():  # else both are the base's, and so is the combination
+        elif not variant.params or own & variant.params.keys():  # otherwise the whole combination is inherited
             self._avoided.add(unfit)
             for problem in error.problems:
                 found = self._at_author(problem, error)
@@ -126,13 +126,13 @@ class NodeCheck:
     def check_scene(self) -> None:
         try:
             resolved = self._resolved(NodeVariant("", outputs=tuple(self.type.cls.outputs())))
-            resolved.spec.check()  # only the scene's name is not ours
+            resolved.spec.check()  # only the scene's name comes from the user
             scene_of(resolved)
         except InputError as error:
             raise InputError([self._at_author(problem, None) for problem in error.problems]) from None
 
     def close(self) -> list[Problem]:
-        """Free everything, and return all problems, with their variants where not all have it."""
+        """Free everything, and return all problems, with their variants unless all have it."""
         self.gpu.close()
         flush_deleted_programs(self.device)
         left = {
@@ -170,7 +170,7 @@ class NodeCheck:
         with self.gpu.current():
             if not self._fed and self.harness.fed:
                 self._fed = self._draw(stages.compile(self._expanded(NodeVariant("")), self.gpu), 0)
-            expanded = self._expanded(variant)  # after the above: both use the same file
+            expanded = self._expanded(variant)  # afterwards, because both use the same file
             if variant.is_range_end and _is_large(expanded.expansion):
                 self.tried.pop()
                 return
@@ -201,7 +201,7 @@ class NodeCheck:
 
     def _note_keywords(self, compiled: CompiledStep) -> None:
         step, parameters = compiled.step, self.type.cls.parameters()
-        caller = step.where.caller  # a base's keywords need not be for the shaders of those who extend it
+        caller = step.where.caller  # a base's keywords need not suit the shaders of subclasses
         if step.node != self.type.name or caller is None or Path(caller[0]).name != self.type.file.name:
             return
         for name, _ in step.uniforms if compiled.all_draws else ():
@@ -320,7 +320,7 @@ def _texels(flags: npt.NDArray[np.bool_], array: npt.NDArray[Any]) -> npt.NDArra
 
 
 KINDS = ("Texture", "Buffer", "Framebuffer", "VertexArray", "Sampler", "Program", "Query", "Renderbuffer")
-_STATE = {  # what `SavedState` holds, in words
+_STATE = {  # descriptions of the fields of `SavedState`
     "enabled": "enabled capabilities",
     "indexed": "blending or the scissor test",
     "units": "bound textures and samplers",
@@ -338,7 +338,7 @@ def count_objects(device: Device, most: int) -> dict[str, int]:
 def flush_deleted_programs(device: Device) -> None:
     """Make the driver free deleted programs: Mesa keeps the last one of a kind until the other kind has run.
 
-    What Mesa keeps afterwards belongs to this function, so call it before and after what is compared.
+    Mesa then keeps programs of this function, so call it before and after the code under test.
     """
     drawing = device.ctx.program(
         vertex_shader="#version 450 core\nvoid main() { gl_Position = vec4(0.0); }",

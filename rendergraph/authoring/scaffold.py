@@ -1,6 +1,6 @@
-"""A new node or project from templates: module, shader, pipeline and test, all of them or none.
+"""Write a new node or project from templates: module, shader, pipeline and test, all of them or none.
 
-Templates are the files of the folder `templates`, with `@words@` to fill in.
+Templates are the files of the folder `templates`, with `@words@` as placeholders.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Kind = Literal["fullscreen", "compute", "geometry", "shader-only"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 SCHEMA_FILE = "rendergraph.schema.json"
-_IDS_OF_FORWARD = ("sun", "shadows", "light", "display")  # ids that the templates' pipelines have already
+_IDS_OF_FORWARD = ("sun", "shadows", "light", "display")  # ids that the templates' pipelines already use
 _IN_PLACE = {
     "imports": "from pathlib import Path",
     "where": "HERE = Path(__file__).parent",
@@ -55,7 +55,7 @@ _LONGEST_NAME = 40
 
 @dataclass(frozen=True)
 class NewNode:
-    """The files that were written, relative to the given folder, and the commands to type there next."""
+    """The files that were written, relative to the given folder, and the commands to run there next."""
 
     name: str
     kind: Kind
@@ -66,7 +66,7 @@ class NewNode:
 def new_project(where: Path) -> NewNode:
     """Write a project into a folder, which need not exist: a pipeline, a scene, a node and settings that find it.
 
-    If a file of it exists already, or writing fails, nothing is left behind.
+    If one of its files exists already, or writing fails, nothing is left behind.
     """
     node = _files(_PROJECT_NODE, "fullscreen", nodes="nodes", file="pipeline")
     words = {"name": _PROJECT_NODE, "id": _PROJECT_NODE, "type": _PROJECT_NODE, "nodes": "nodes"}
@@ -87,8 +87,8 @@ def new_project(where: Path) -> NewNode:
 def new_node(name: str, kind: Kind = "fullscreen", *, package: bool = False, where: Path = Path()) -> NewNode:
     """Write a working node into a folder; with `package`, as a folder that can be installed.
 
-    In the folder of a project its module and shader go into the project's folder of nodes, where they are found. If a
-    file of it exists already, or writing fails, nothing is left behind.
+    In the folder of a project, the module and shader go into the project's folder of nodes, where they are found. If
+    one of the files exists already, or writing fails, nothing is left behind.
     """
     mistake = _name_mistake(name, set(Catalog.discover().names()))
     if mistake:
@@ -116,9 +116,9 @@ def new_node(name: str, kind: Kind = "fullscreen", *, package: bool = False, whe
 
 
 def _project_nodes(where: Path) -> tuple[str, bool]:
-    """Return the project's folder of nodes, for a new node in the project's folder, and whether such a node is found.
+    """Return the folder of nodes of the project in `where`, and whether a node there is found without options.
 
-    In another folder the first is empty: a new node's files are written beside each other.
+    Outside a project the first is empty: a new node's files are written into one folder.
     """
     here, project = where.resolve(), nearest_settings(where.resolve())
     plugins = [path.resolve() for path in project.plugins if path.is_dir()] if project else []
@@ -132,13 +132,13 @@ def _project_nodes(where: Path) -> tuple[str, bool]:
 
 
 def class_name(name: str) -> str:
-    """Return `LensFalloff` for `lens_falloff`, or a longer name where plugin authors import that one."""
+    """Return `LensFalloff` for `lens_falloff`, or a longer name if `rendergraph.api` has that one."""
     camel = "".join(part.capitalize() for part in name.split("_"))
     return f"{camel}Node" if hasattr(api, camel) else camel
 
 
 def _name_mistake(name: str, existing: Set[str]) -> str:
-    """Return why a name cannot be a node type, a module and a GLSL file at once; empty where it can."""
+    """Return why a name cannot be a node type, a module and a GLSL file at once; empty if it can."""
     if not _NAME.match(name) or len(name) > _LONGEST_NAME:
         better = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
         better = re.sub(r"[^a-z0-9]+", "_", better).strip("_0123456789")[:_LONGEST_NAME].strip("_")
@@ -195,7 +195,7 @@ def _files(name: str, kind: Kind, *, package: bool = False, nodes: str = "", fil
         stem, suffix = template.name.removesuffix(".in").split(".")
         target = f"test_{name}.py" if stem == "test" else f"{words['file'] if stem == 'pipeline' else name}.{suffix}"
         if package:
-            is_module = suffix == "py" or kind == "shader-only"  # a shader that is a node is among the nodes
+            is_module = suffix == "py" or kind == "shader-only"  # a shader node is stored with the nodes
             homes = {"pipeline": "pipelines", "test": "tests", "node": "nodes" if is_module else "shaders"}
             target = f"{name}/{homes[stem]}/{target}"
         elif home := homes.get(stem):
@@ -219,13 +219,13 @@ def _templates(kind: str) -> list[Path]:
 
 def _fill(file: Path, words: Mapping[str, str]) -> str:
     text = file.read_text(encoding="utf-8")
-    for _ in range(2):  # words may hold words
+    for _ in range(2):  # values may contain placeholders
         text = re.sub(r"@(\w+)@", lambda found: words[found[1]], text)
     return text
 
 
 def _schema(files: Mapping[str, str], *, by_path: bool) -> str:
-    """Return the schema of everything installed and of this node, unless the pipeline names that by its path."""
+    """Return the schema of all installed nodes and of this node, unless the pipeline names it by path."""
     with tempfile.TemporaryDirectory() as place:
         node = Path(place) / "nodes"
         node.mkdir()
@@ -240,7 +240,7 @@ def _json(document: Any) -> str:
 
 
 def refuse_existing(where: Path, paths: Iterable[str]) -> None:
-    """Raise an InputError if one of the files that are to be written exists."""
+    """Raise an InputError if one of the files to be written exists."""
     existing = [path for path in paths if (where / path).exists() or (where / path).is_symlink()]
     text = "'{}' already exists and was not changed; move it or choose another name"
     if existing:
@@ -248,7 +248,7 @@ def refuse_existing(where: Path, paths: Iterable[str]) -> None:
 
 
 def write_files(where: Path, files: Mapping[str, str | bytes]) -> None:
-    """Write all files or none; a file that appears meanwhile under one of the names is not touched."""
+    """Write all files or none; a file created meanwhile under one of the names is not touched."""
     made: list[Path] = []
     try:
         for path, text in files.items():

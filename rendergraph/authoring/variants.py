@@ -10,7 +10,7 @@ from rendergraph.declare import InOut, Input, Node
 from rendergraph.errors import Problem
 
 MOST_VARIANTS = 200
-"""Of one node; further ones are not rendered."""
+"""Maximum number of variants of one node; further ones are not rendered."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Report:
 
 @dataclass(frozen=True)
 class NodeVariant:
-    """One way to use a node; its name says how it differs from the default, and is empty for that."""
+    """One way to use a node; its name says how it differs from the default, whose name is empty."""
 
     name: str
     params: Mapping[str, Any] = field(default_factory=dict)

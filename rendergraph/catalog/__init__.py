@@ -1,7 +1,7 @@
-"""Finding node types: the standard nodes and a stranger's plugin arrive by the same entry point.
+"""Find node types: the standard nodes and third-party plugins use the same entry point.
 
-Folders are listed, modules are not imported: a type's name is the stem of its module, and a run imports only the nodes
-it uses.
+Folders are listed without importing modules: a type's name is the stem of its module, and a run imports only the nodes
+that it uses.
 """
 
 from __future__ import annotations

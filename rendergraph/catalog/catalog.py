@@ -1,4 +1,4 @@
-"""Node types by name, imported when they are asked for."""
+"""Node types by name, imported on first use."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from rendergraph.installed import entry_points, plain
 GROUP = "rendergraph.nodes"
 """The entry point group; an entry's value is a package of node modules in folders by family."""
 NOTEBOOK = "notebook"
-"""The plugin of classes that a script or a notebook defines itself."""
+"""The plugin name of classes that a script or a notebook defines."""
 
 
 class Catalog:
-    """Node types by name, imported when they are asked for."""
+    """Node types by name, imported on first use."""
 
     def __init__(
         self,
@@ -35,21 +35,21 @@ class Catalog:
         self._loaded: dict[tuple[str, tuple[Listed, ...]], NodeType] = {}
         self._classes: dict[str, type[Node]] = {}
         self.notes = notes
-        """Warnings: what the environment names and is not there, as a folder of PATH need not be."""
+        """Warnings about plugins that the environment names but that do not exist, as folders of PATH need not."""
         self.extensions = extensions
-        """What plugins add beside node types, imported when the first name is asked for."""
+        """What plugins add besides node types, imported when the first name is requested."""
 
     @classmethod
     def discover(cls, plugin_paths: Iterable[Path] = (), *, installed: bool = True) -> Catalog:
         """Return all installed node types, and those in files and folders the user named.
 
         These are, in this order, packages by entry point, `plugins` of the settings of the project around the current
-        folder, `RENDERGRAPH_PATH`, and `plugin_paths`. A folder that is a package's project, as its `pyproject.toml`
-        says, replaces an installed copy of the package.
+        folder, `RENDERGRAPH_PATH`, and `plugin_paths`. A folder that is a package's project, according to its
+        `pyproject.toml`, replaces an installed copy of the package.
 
         Args:
             plugin_paths: node modules, shader files, or folders of them; code, so never taken from a pipeline file.
-            installed: look at more than `plugin_paths`.
+            installed: also search beyond `plugin_paths`.
         """
         named = {entry.path.resolve(): entry for entry in find.configured()} if installed else {}
         named |= {path.resolve(): find.PluginPath(path) for path in plugin_paths}
@@ -75,11 +75,11 @@ class Catalog:
         return found.with_classes(own_classes()) if installed else found
 
     def with_file(self, name: str, file: Path) -> Catalog:
-        """The same with one shader file under the name, which is most likely its path."""
+        """Return the same with one shader file under the name, which is usually its path."""
         return self.with_shaders([(name, find.shader(file.resolve()))])
 
     def with_shaders(self, found: Iterable[tuple[str, Listed]]) -> Catalog:
-        """The same with shader files that a pipeline file names; what has been loaded is shared."""
+        """Return the same with shader files that a pipeline file names; loaded types are shared."""
         listed = {name: list(those) for name, those in self._listed.items()}
         _add(listed, found)
         more = Catalog(listed, self._types, self.extensions, self.notes)
@@ -88,13 +88,13 @@ class Catalog:
 
     @classmethod
     def of(cls, *classes: type[Node], shaders: Path = Path(), **named: type[Node]) -> Catalog:
-        """A catalog of classes at hand, for tests; a type's name is the class's in snake case, or the keyword."""
+        """Return a catalog of classes, for tests; a type's name is the class's in snake case, or the keyword."""
         named = {type_name(c): c for c in classes} | named
         files = {name: modules.file_of(c.__module__) for name, c in named.items()}
         return cls({}, {name: NodeType(name, "", c, files[name], shaders, "test") for name, c in named.items()})
 
     def with_classes(self, named: Mapping[str, type[Node]]) -> Catalog:
-        """The same with classes of a running program, in place of other types of their names.
+        """Return the same with classes of a running program, which replace other types of the same names.
 
         Their shaders are in the current folder, or in the folder of the class's module.
         """
@@ -109,7 +109,7 @@ class Catalog:
         return sorted(self._types.keys() | self._classes.keys() | self._listed.keys())
 
     def has_plugin(self, name: str) -> bool:
-        """Whether something comes from a plugin of this name, spelled as packages or as modules are."""
+        """Whether anything comes from a plugin of this name, spelled like a package or like a module."""
         plugins = {one.plugin for found in self._listed.values() for one in found}
         return any(plain(plugin) == plain(name) for plugin in plugins)
 
@@ -125,7 +125,7 @@ class Catalog:
         return dict(sorted(table.items()))
 
     def get(self, name: str) -> NodeType:
-        """Return a type, imported on first use."""
+        """Return a type, importing it on first use."""
         if name in self._types:
             return self._types[name]
         if (cls := self._classes.get(name)) is not None:
@@ -140,7 +140,7 @@ class Catalog:
         return self._loaded[key]
 
     def usable(self, names: Iterable[str] | None = None) -> tuple[list[NodeType], list[Problem]]:
-        """Return the valid types, of all or of these names, and the mistakes in the others."""
+        """Return the valid types among all or these names, and the mistakes in the others."""
         found: list[NodeType] = []
         problems: list[Problem] = []
         for name in self.names() if names is None else names:
@@ -171,7 +171,7 @@ def own_classes() -> dict[str, type[Node]]:
 
 
 def _add(listed: dict[str, list[Listed]], found: Iterable[tuple[str, Listed]]) -> None:
-    """Add what was found; a file that is named twice is one type."""
+    """Add types; a file that is named twice is one type."""
     for name, one in found:
         known = listed.setdefault(name, [])
         if all(one.file != other.file for other in known):

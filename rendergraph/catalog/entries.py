@@ -53,7 +53,7 @@ MOST_NAMES = 256
 
 
 class Entries:
-    """Collects the ports and parameters of one file, and what is wrong with them."""
+    """Collects the ports and parameters of one file, and the mistakes in them."""
 
     def __init__(self, file: Path, raw: str, header: Header, source: SourceText, extensions: Extensions) -> None:
         self.file = file
@@ -87,13 +87,13 @@ class Entries:
         return Place(shown_file(self.file), 1, 1)
 
     def _place(self, at: int) -> tuple[Place | None, str]:
-        """The place in the author's file of a character of the text, and its line."""
+        """Return the place in the author's file of a character of the text, and its line."""
         number = self.text.count("\n", 0, at)
         column = at - (self.text.rfind("\n", 0, at) + 1) + 1
         return self.source.origins[number].place(column), self.source.lines[number]
 
     def place_of(self, name: str) -> Place:
-        """Where a name is declared, in the text or else in the header."""
+        """Return where a name is declared, in the text or else in the header."""
         if name in self.declared and (place := self._place(self.declared[name].at)[0]):
             return place
         return self.header.names[name].key_place if name in self.header.names else Place(shown_file(self.file))
@@ -101,7 +101,7 @@ class Entries:
     def collect(self) -> None:
         count = len(self.declared.keys() | self.header.names.keys())
         if count > MOST_NAMES:
-            text = f"the shader has {count:,} ports and parameters, {MOST_NAMES} are the limit; a texture holds tables"
+            text = f"the shader has {count:,} ports and parameters, the limit is {MOST_NAMES}; use a texture for tables"
             self.report("RG441", text)
             return
         if self.header.threads is not None and self.file.suffix != ".comp":
@@ -143,7 +143,7 @@ class Entries:
             self._parameter(name, {})
 
     def _match_single_output(self) -> None:
-        """A single `out` may have any name."""
+        """Match the only `out` with the only output of the header: their names may differ."""
         colors = [name for name, entry in self.header.outputs.items() if not _is_depth(entry)]
         if len(colors) == len(self._outs) == 1:
             written = self._outs[0].name
@@ -151,7 +151,7 @@ class Entries:
                 self._renamed[written] = colors[0]
 
     def outputs_by_location(self) -> list[str]:
-        """Outputs in the order of the locations that the text gives; empty if it gives none."""
+        """Return outputs in the order of the text's locations; empty if it gives none."""
         located: dict[int, str] = {}
         for found in self._outs:
             if "location" in found.layout:
@@ -164,7 +164,7 @@ class Entries:
         if not located:
             return []
         if sorted(located) != list(range(len(self._outs))):
-            text = "locations of outputs go from 0 without gaps, for all or for none; leave the layouts out"
+            text = "locations of outputs start at 0 and have no gaps, for all outputs or none; leave the layouts out"
             self.report("RG441", text, self._outs[0])
         depth = [name for name, entry in self.header.outputs.items() if _is_depth(entry)]
         return [*(located[number] for number in sorted(located)), *depth]
@@ -207,14 +207,14 @@ class Entries:
         self.ports[name] = Input(self._semantic(entry, options["kind"]), **options)
 
     def _undeclared_kind(self, name: str, entry: Mapping[str, Value]) -> str:
-        """The kind of an input that the text need not declare; empty, and a mistake, if it must."""
+        """Return the kind of an input that the text need not declare; report a mistake and return empty if it must."""
         if "kind" in entry:
             return str(entry["kind"].data)
         semantic = str(entry["semantic"].data) if "semantic" in entry else ""
         if semantic == SceneData.name:
             return "scene"
         if semantic in [signature.texture for signature in SIGNATURES]:
-            return "texture2d_array"  # the function of that signature reads it
+            return "texture2d_array"  # read by the function of that signature
         samplers = [g.name for g in self.globals.declared if _SAMPLER.match(g.type) and g.name not in self.header.names]
         text = f"the header has input '{name}', but the shader declares no 'uniform sampler2D {name};'"
         self._report_name(name, text + suggestion(name, samplers))
@@ -268,7 +268,7 @@ class Entries:
         self.ports[name] = Output(**options)
 
     def _fits_output(self, name: str, found: Global, entry: Mapping[str, Value], options: dict[str, Any]) -> bool:
-        """Take kind and format from the declaration; false, and a mistake, if it is not an output's."""
+        """Take kind and format from the declaration; report a mistake and return False if it is not an output's."""
         if found.storage == "buffer":
             options["kind"] = "buffer"
             return True
@@ -294,7 +294,7 @@ class Entries:
         return self._fits_format(found, entry)
 
     def _fits_format(self, found: Global, entry: Mapping[str, Value]) -> bool:
-        """Whether the header's format holds values of the declared type; a mistake if not."""
+        """Return whether the header's format holds values of the declared type; report a mistake if not."""
         texel = FORMATS.get(str(entry["format"].data)) if "format" in entry else None
         if texel is None:
             return True
@@ -328,11 +328,11 @@ class Entries:
 
     @cached_property
     def _words(self) -> frozenset[str]:
-        """Words of the text, its includes, and of what is included by a parameter, as in `#include <CURVE>`."""
+        """Words of the text, of its includes, and of files included by a parameter, as in `#include <CURVE>`."""
         return frozenset(re.findall(r"[A-Za-z_]\w*", "\n".join((*self.source.lines, strip_comments(self.raw)))))
 
     def _check_references(self) -> None:
-        """`like`, `size` and `$name` must name inputs and structural parameters."""
+        """Check that `like`, `size` and `$name` name inputs and structural parameters."""
         inputs = dict.fromkeys([name for name, port in self.ports.items() if isinstance(port, Input)])
         inputs |= dict.fromkeys(self.header.inputs)  # a wrong one has been reported
         params = self.header.params.items()
@@ -356,7 +356,7 @@ class Entries:
                     self.problems.append(first.problem("RG444", text))
 
     def warnings(self, cls: type[Node]) -> Iterator[Problem]:
-        """What the class made of these lacks, in one line; and what only looks right."""
+        """Yield one warning about everything that the class lacks, and warnings about likely mistakes."""
         ports = [name for name, port in self.ports.items() if not getattr(port, "doc", "")]
         undocumented = [*ports, *(name for name, parameter in cls.parameters().items() if not parameter.doc)]
         missing = [] if self.header.doc else ["doc of the node"]
@@ -383,7 +383,7 @@ def _listed(names: list[str]) -> str:
 
 
 def number_rule(value: Value) -> Ruled[int]:
-    """A whole number, `all` for all mips (0), or the value of a structural parameter."""
+    """Return a whole number, 0 for `all` (mips), or a rule that reads a structural parameter."""
     data = value.data
     if not isinstance(data, str):
         return int(data)  # type: ignore[arg-type]  # the header's reader saw a number
@@ -396,7 +396,7 @@ def _word_rule(value: Value) -> Any:
 
 
 def _size_rule(value: Value) -> SizeRule:
-    """A factor of the picture, an input, `[input, factor]` or `[width, height]`; factors may be parameters."""
+    """Return a factor of the picture, an input, (input, factor) or (width, height); factors may be parameters."""
     data = value.plain()
     first, factor = data if isinstance(data, list) else (None, data)
     if not isinstance(factor, str):

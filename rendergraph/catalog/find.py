@@ -1,7 +1,7 @@
-"""Finding node types and what plugins add beside them, in packages, folders and files; no node is imported or parsed.
+"""Find node types and plugin extensions in packages, folders and files; no node is imported or parsed.
 
 A module is a node type, and so is a shader file. In a folder with Python files, and in a folder `shaders` beside
-`nodes`, a shader file is most likely part of a node; there it is a type only if it has a header.
+`nodes`, a shader file is usually part of a node; there it is a type only if it has a header.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ NAME = "EXTENSION"
 VARIABLE = "RENDERGRAPH_PATH"
 """Folders and files with nodes, separated as in PATH."""
 MOST_FILES = 10_000
-"""Limit of files in a folder that a pipeline file names; a plugin has a few dozen."""
+"""Limit of files in a folder that a pipeline file names; plugins have a few dozen."""
 
 _NO_NODE = re.compile(r"_|test_|conftest\Z")
 """Modules that are helpers, or that pytest looks for: tests may lie beside the nodes they test."""
@@ -50,7 +50,7 @@ _MODULES: FileCache[list[tuple[str, Listed]]] = FileCache(16)
 
 
 class PluginPath(Struct, frozen=True):
-    """A plugin by path, and where it is named: a settings file, or else in words."""
+    """A plugin by path, and where it is named: a place in a settings file, or a phrase."""
 
     path: Path
     place: Place | None = None
@@ -58,7 +58,7 @@ class PluginPath(Struct, frozen=True):
 
     @property
     def words(self) -> str:
-        """Who names it, to follow its file."""
+        """The phrase that says where it is named, to follow its path."""
         return self.where or (f", which {self.place.file} names" if self.place is not None else ", given as a plugin")
 
 
@@ -74,9 +74,9 @@ def configured() -> Iterator[PluginPath]:
 
 
 def projects(folders: Iterable[Path]) -> frozenset[str]:
-    """Return the plain names of the distributions that folders are the projects of.
+    """Return the normalized names of the distributions whose project folders these are.
 
-    A project's folder stands in for a copy of it that was installed some time ago.
+    A project's folder replaces an installed copy, which may be older.
     """
     return frozenset({_project(folder) for folder in folders} - {"", OWN})
 
@@ -86,7 +86,7 @@ def _project(folder: Path) -> str:
     record_read(file)
     if not file.is_file():
         return ""
-    import tomllib  # most folders lie in no project
+    import tomllib  # only for folders of projects
 
     try:
         name = tomllib.loads(file.read_text(encoding="utf-8"))["project"]["name"]
@@ -96,12 +96,12 @@ def _project(folder: Path) -> str:
 
 
 def package(plugin: str, package: str) -> Iterator[tuple[str, Listed]]:
-    """Yield the modules of an installed package; of it only the parent is imported."""
+    """Yield the modules of an installed package; only its parent package is imported."""
     try:
         spec = importlib.util.find_spec(package)
     except (ImportError, ValueError, AttributeError):
         spec = None
-    if spec is None:  # an entry left behind by a half-removed package: its nodes are missing, no more
+    if spec is None:  # an entry left behind by a half-removed package: only its nodes are missing
         return
     if not spec.submodule_search_locations:
         file = Path(spec.origin or "")
@@ -135,7 +135,7 @@ def _listed(folder: Path, package: str, plugin: str, shaders: Path | None) -> It
 
 
 def _files(folder: Path, most: float = math.inf) -> Iterator[tuple[str, str, str, str]]:
-    """Folder, family, stem and ending of everything that may be a node type; ValueError for more files than `most`."""
+    """Yield folder, family, stem and extension of files that may be node types; ValueError for more than `most`."""
     seen, top = 0, os.fspath(folder)
     for where, subfolders, files in os.walk(top):
         record_read(where)
@@ -176,7 +176,7 @@ def shaders(folder: Path, most_files: int = MOST_FILES) -> tuple[list[tuple[str,
 
 
 def shader(file: Path) -> Listed:
-    """Return one shader file that is used by its path."""
+    """Return a shader file that is used by its path."""
     return Listed("", "", file, file.parent, file.parent.name)
 
 
@@ -213,7 +213,7 @@ def loose(named: PluginPath) -> Iterator[tuple[str, Listed]]:
 
 
 def extensions(folders: Iterable[tuple[str, Path]], offered: Iterable[EntryPoint]) -> Extensions:
-    """Return what plugins add; nothing is imported before it is asked for."""
+    """Return what plugins add; nothing is imported before it is requested."""
     named, entries = tuple(folders), sorted(offered, key=lambda entry: entry.value)
     return Extensions(lambda: _sources(named, entries))
 
@@ -236,7 +236,7 @@ def _file(entry: EntryPoint) -> Path:
     """The file of an entry's module, found without importing more than its parent; empty if there is none."""
     try:
         spec = importlib.util.find_spec(entry.module)
-    except BaseException as error:  # its parent fails to import, which loading will report
+    except BaseException as error:  # its parent cannot be imported, which loading will report
         if is_interruption(error):
             raise
         spec = None
@@ -248,7 +248,7 @@ def _source(plugin: str, file: Path, load: Callable[[], Any], value: str) -> Sou
     place = Place(shown_file(file)) if file.name else None
     try:
         found = load()
-    except BaseException as error:  # whatever third-party code raises is a mistake in that code
+    except BaseException as error:  # anything that third-party code raises is its mistake
         if is_interruption(error):
             raise
         text = f"the extension of plugin '{plugin}' ({value}) cannot be imported: {describe_error(error)}"

@@ -1,4 +1,4 @@
-"""The YAML header of a shader file: what it says of ports and parameters, each value with its place in the file."""
+"""The YAML header of a shader file: its ports and parameters, each value with its place in the file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _NAME = re.compile(r"[A-Za-z]\w*\Z", re.ASCII)
 
 
 class Header(Struct, frozen=True, eq=False):
-    """A header as it is written, without what is wrong in it.
+    """A header as it is written, without its wrong entries.
 
     Attributes:
         inputs, outputs, params: the keys of each entry by its name.
@@ -54,7 +54,7 @@ def read_header(text: str, file: Path, name: str) -> Header:
         if almost is not None and any(line.strip() == END for line in lines[almost:]):
             raise InputError(_problem(name, lines, almost, f"a header begins with a line '{BEGIN}', without spaces"))
         return Header()
-    first = text.count("\n", 0, begin.start()) + 1  # the line behind the fence, counted from 0
+    first = text.count("\n", 0, begin.start()) + 1  # the line after the fence, counted from 0
     last = next((number for number in range(first, len(lines)) if "*/" in lines[number]), None)
     if last is None or lines[last].strip() != END:
         at = first - 1 if last is None else last
@@ -101,41 +101,41 @@ _DEFAULT: Any = Annotated[
 ]
 _FORMAT: Any = Annotated[choice(*FORMATS) | _REFERENCE, Brief("format | $name")]
 
-_DOC = Key("doc", TEXT, "What it is, in a line.")
+_DOC = Key("doc", TEXT, "What it is, in one line.")
 INPUT = Table(
     "an input",
     (
         _DOC,
-        Key("semantic", word(_NAME, "a word"), "What its texels must mean; for a function, its name.", "any"),
+        Key("semantic", word(_NAME, "a word"), "Meaning of its texels; for a function, its name.", "any"),
         Key("kind", choice("function", "view"), "Kind of an input that is not a texture; by default the sampler's."),
         Key("optional", bool, "It may stay unconnected; `HAS_<NAME>` is then undefined.", False),
-        Key("many", bool, "It takes a list; the shader sees `name_0`, `name_1`, ….", False),
-        Key("size", choice("same", "any"), "Whether it must be as large as the target.", "same"),
+        Key("many", bool, "It takes a list of links; the shader sees `name_0`, `name_1`, ….", False),
+        Key("size", choice("same", "any"), "Whether it must have the size of the target.", "same"),
         Key("filter", choice(*get_args(Filter)), "How it is filtered.", "nearest"),
         Key("wrap", choice(*get_args(Wrap)), "How it is read outside its edges.", "clamp"),
         Key("anisotropy", whole(1, 16), "Maximum anisotropy of filtering.", 1),
         Key("border", NUMBER | vector(4), "Value outside its edges, with `wrap: border`.", 1),
         Key("group", word(_NAME, "a word"), "Inputs of one group are connected together."),
-        Key("rays", bool, "With `semantic: scene_data`: the tree for <trace.glsl>, too.", False),
+        Key("rays", bool, "With `semantic: scene_data`: also the BVH for <trace.glsl>.", False),
     ),
 )
 OUTPUT = Table(
     "an output",
     (
         _DOC,
-        Key("semantic", word(_NAME, "a word"), "What its texels mean; by default that of `like`, or `any`."),
+        Key("semantic", word(_NAME, "a word"), "Meaning of its texels; by default that of `like`, or `any`."),
         Key("like", _INPUT, "An input whose format, size, semantic and view are its defaults."),
         Key("format", _FORMAT, "Format of a texel, such as `r32f`.", "rgba16f"),
         Key("size", _SIZE, "A factor of the picture's size, an input with the same size, or a number of texels.", 1),
-        Key("mips", choice("all") | _count(15), "Levels of detail.", 1),
-        Key("layers", _count(2048), "Layers of an array.", 1),
-        Key("samples", _count(16), "Samples of a texel.", 1),
+        Key("mips", choice("all") | _count(15), "Mip levels.", 1),
+        Key("layers", _count(2048), "Array layers.", 1),
+        Key("samples", _count(16), "Samples per texel.", 1),
         Key("clear", NUMBER | vector(4), "Value where nothing is written."),
         Key("first", NUMBER, "Value that `@previous` reads in the first frame.", 0),
         Key(
             "kept",
             bool,
-            "It outlives the frame, and is computed again only when its inputs or parameters change.",
+            "It is kept from frame to frame, and recomputed only when its inputs or parameters change.",
             False,
         ),
         Key("bytes", _count(1 << 30), "Size of a buffer."),
@@ -149,7 +149,7 @@ PARAM = Table(
         Key("unit", TEXT, "The unit's symbol."),
         Key("min", NUMBER, "Minimum of each component."),
         Key("max", NUMBER, "Maximum of each component."),
-        Key("role", choice("param", "define", "structural"), "A uniform, a macro `NAME`, or part of the plan."),
+        Key("role", choice("param", "define", "structural"), "A uniform, a macro `NAME`, or a part of the plan."),
         Key("choices", listed(word(_NAME, "a word"), "words", 1), "Its possible words, if it is not a uniform."),
     ),
 )

@@ -1,7 +1,7 @@
-"""Import of node modules; those of plugins by path are imported anew when one of the folder's files has changed.
+"""Import of node modules; those of plugins by path are reloaded when a file of their folder has changed.
 
-All modules of one folder are dropped together, helpers included, so that none holds on to an old class of another.
-Installed packages are imported once, as everywhere.
+All modules of one folder, including helpers, are dropped together, so that none refers to an old class of another.
+Installed packages are imported once, as usual.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from rendergraph.errors import InputError, Place, Problem, is_interruption, show
 from rendergraph.stamps import Stamp, modified, record_read, replay_reads, track_reads
 
 PREFIX = "rendergraph_plugin_"
-"""Start of the names of the packages that stand for folders; a number that tells them apart follows."""
+"""Prefix of the names of packages that stand for folders; a number follows."""
 
 _FILES: dict[str, dict[str, Stamp]] = {}
-"""Package to the files that its modules in `sys.modules` were made from."""
+"""Package to the source files of its modules in `sys.modules`."""
 
 
 def load(name: str, listed: Listed) -> NodeType:
-    """Import the one node class of a module; an error if the module fails or declares its node wrongly."""
+    """Import the one node class of a module; raise if the module fails or declares its node wrongly."""
     place = Place(shown_file(listed.file))
     try:
         module = importlib.import_module(listed.module)
-    except BaseException as error:  # whatever third-party code raises is a mistake in that code
+    except BaseException as error:  # anything that third-party code raises is its mistake
         if is_interruption(error):
             raise
         text = f"node type '{name}' cannot be imported: {describe_error(error)}"
@@ -42,13 +42,13 @@ def load(name: str, listed: Listed) -> NodeType:
     classes = list(dict.fromkeys(own))
     if len(classes) != 1:
         names = ", ".join(cls.__name__ for cls in classes) or "none"
-        text = f"the module of node type '{name}' must define one Node class, it has {names}"
+        text = f"the module of node type '{name}' must define one Node class; it has {names}"
         raise InputError(Problem("RG492", text, place))
     return of_class(name, classes[0], listed)
 
 
 def of_class(name: str, cls: type[Node], listed: Listed) -> NodeType:
-    """Return the node type of a class; an error if it declares its node wrongly."""
+    """Return the node type of a class; raise if it declares its node wrongly."""
     problems = declaration_mistakes(cls)
     if not problems and not cls.ports():
         problems = [Problem("RG490", "the class has no ports; add an output, as in `color = Output(Radiance, doc=…)`")]
@@ -62,12 +62,12 @@ def of_class(name: str, cls: type[Node], listed: Listed) -> NodeType:
 
 
 def file_of(module: str) -> Path:
-    """Return the file of an imported module; that of a notebook has none."""
+    """Return the file of an imported module; a notebook's has none."""
     return Path(getattr(sys.modules.get(module), "__file__", None) or "")
 
 
 def _shaders_of(module: str, file: Path) -> Path:
-    """The folder of a module's shaders: of `X.nodes.family.a` it is `X.shaders/family`, else the module's own."""
+    """Return the folder of a module's shaders: `X.shaders/family` for `X.nodes.family.a`, else the module's own."""
     before, nodes, family = module.rpartition(".")[0].partition(".nodes")
     shaders = shader_folder(before + nodes) if nodes and family[:1] in ("", ".") else None
     return file.parent if shaders is None else shaders.joinpath(*family.split("."))
@@ -87,7 +87,7 @@ def shader_folder(package: str) -> Path | None:
 
 
 class _Loader(SourceFileLoader):
-    """Compiles the source each time: compiled files are told apart by whole seconds, edits may be quicker."""
+    """Compiles the source each time, because .pyc files are dated in whole seconds and edits may be quicker."""
 
     def get_code(self, fullname: str) -> CodeType:
         with track_reads() as files:
@@ -97,7 +97,7 @@ class _Loader(SourceFileLoader):
 
 
 class _Finder:
-    """Finds the modules of the packages that `fresh_package` made, in the folder as it is now."""
+    """Finds the modules of packages from `fresh_package` in the current state of their folders."""
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
@@ -112,7 +112,7 @@ _FINDER = _Finder()
 
 
 def fresh_package(name: str, folder: Path) -> None:
-    """Make a folder importable as a package; drop what has been imported from it if a file has changed."""
+    """Make a folder importable as a package; drop its imported modules if a file has changed."""
     if _FINDER not in sys.meta_path:
         sys.meta_path.insert(0, _FINDER)
     if name in sys.modules and modified(_FILES.get(name, {})):

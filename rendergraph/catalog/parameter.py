@@ -26,9 +26,9 @@ def uniform_names(declared: Iterable[Global]) -> list[str]:
 
 
 class ParameterReader(Struct, eq=False):
-    """The keys of the header, the entry's value, the declaration, and what reports code and text.
+    """Reads a parameter from the header's keys, the entry's value and the declaration.
 
-    `report` is given the value of the header that is wrong, None for the declaration.
+    `report` receives code, text and the wrong value of the header, None for the declaration.
     """
 
     name: str
@@ -39,7 +39,7 @@ class ParameterReader(Struct, eq=False):
     lacks_range: bool = False
 
     def parameter(self, uniforms: Sequence[str], words: Callable[[], Set[str]]) -> Parameter | None:
-        """Return the parameter, None if it is wrong."""
+        """Return the parameter; None if it is wrong."""
         found, entry = self.found, self.entry
         role: Any = self._text("role") or ("param" if found is not None else "define")
         if mismatch := self._mismatch(role, uniforms, words):
@@ -70,7 +70,7 @@ class ParameterReader(Struct, eq=False):
         return data if isinstance(data, int | float) else None
 
     def _mismatch(self, role: str, uniforms: Sequence[str], words: Callable[[], Set[str]]) -> str:
-        """Report in words that header and declaration disagree; empty if they agree."""
+        """Return how header and declaration disagree; empty if they agree."""
         found, name = self.found, self.name
         if found is not None:
             if role == "param" and found.storage == "uniform":
@@ -92,7 +92,7 @@ class ParameterReader(Struct, eq=False):
         return [name.upper().replace("-", "_") for name in names]
 
     def _of_uniform(self, found: Global) -> tuple[Any, Any]:
-        """Type and default of a uniform: the header's default, else its initialiser, else 0."""
+        """Return type and default of a uniform: the header's default, else its initialiser, else 0."""
         vector = _VECTOR.match(found.type)
         kind: type = (int if vector[1] else float) if vector else _SCALAR[found.type]
         count = int(vector[2]) if vector else 1
@@ -120,7 +120,7 @@ class ParameterReader(Struct, eq=False):
         return kind, converted[0]
 
     def _of_header(self) -> tuple[Any, Any] | None:
-        """Type and default of a parameter that is not a uniform; None if they are wrong."""
+        """Return type and default of a parameter that is not a uniform; None if they are wrong."""
         default = self.entry["default"].plain() if "default" in self.entry else None
         if "choices" in self.entry:
             choices = tuple(map(str, self.entry["choices"].plain()))

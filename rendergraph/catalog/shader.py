@@ -1,6 +1,6 @@
-"""A shader file as a node type: a class made of its header and of its declarations, without GL and without Python code.
+"""A shader file as a node type: a class generated from its header and declarations, without GL or Python code.
 
-The class is like any author's: checking, schema, docs and expansion see no difference.
+The class is like any other: checking, schema, docs and expansion need no special case.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ class _ShaderType(Struct, frozen=True):
 
 _MOST_TYPES = 256
 _TYPES: dict[tuple[object, ...], _ShaderType] = {}
-"""By all that a type is made of: a file is one class in all pipelines, which then share its passes."""
+"""Cached by everything that defines a type: a file is one class in all pipelines, which can then share passes."""
 
 
 def load(name: str, listed: Listed, extensions: Extensions) -> NodeType:
-    """Return the node type of a shader file; `extensions` have the semantics that plugins add."""
+    """Return the node type of a shader file; `extensions` provide the semantics of plugins."""
     file = listed.file
     raw = read_text(file)
     header = read_header(raw, file, shown_file(file))
@@ -54,7 +54,7 @@ def load(name: str, listed: Listed, extensions: Extensions) -> NodeType:
 
 
 def _plugin_semantics(header: Header, extensions: Extensions) -> list[Any]:
-    """The plugins' semantics if the header uses one: no plugin is imported for others."""
+    """Return the plugins' semantics if the header uses one; otherwise no plugin is imported."""
     entries = [*header.inputs.values(), *header.outputs.values()]
     own = {known.name for known in SEMANTICS} | {known.name for known in SIGNATURES}
     foreign = any("semantic" in entry and entry["semantic"].data not in own for entry in entries)
@@ -73,7 +73,7 @@ def _make(entries: Entries) -> _ShaderType:
     doc = header.doc or f"The shader {file.name}."
     parts = {"__module__": __name__, "__doc__": doc, "shader": file.name, "record": record}
     cls = type(name, (Node,), {**parts, **entries.ports, **entries.parameters})
-    # Missing docs are a warning, and other tools' shaders have names with capitals.
+    # Missing docs are only a warning, and shaders of other tools may have capitals in names.
     if mistakes := declaration_mistakes(cls, lenient=True):
         where = f"shader '{file.name}'"
         raise InputError([found.relocate(entries.place_of(found.subject), context=where) for found in mistakes])
@@ -90,14 +90,14 @@ def _fullscreen(entries: Entries) -> Record:
         if not ordered:
             steps.fullscreen(file)
             return
-        ports = self.ports()  # the text says which attachment is which, so none of them is left out
+        ports = self.ports()  # the text fixes the locations, so none is left out
         steps.fullscreen(file, out={name: ports[name] for name in ordered})
 
     return record
 
 
 def _compute(entries: Entries) -> Record:
-    """One dispatch with as many groups as its threads need."""
+    """Return a `record` with one dispatch of as many groups as its threads need."""
     file = entries.file.name
     local = tuple(_local_size(entries, f"local_size_{axis}") for axis in "xyz")
     if not any(f"local_size_{axis}" in entries.globals.input_layout for axis in "xyz"):
@@ -128,7 +128,7 @@ def _local_size(entries: Entries, name: str) -> int:
 
 
 def _threads(entries: Entries) -> Threads:
-    """The thread counts: the size of a texture, or the numbers of the header."""
+    """Return the thread counts: the size of a texture, or the numbers of the header."""
     given = entries.header.threads
     if given is not None and (not isinstance(given.data, str) or given.data.startswith("$")):
         rules = [number_rule(part) for part in (given.data if isinstance(given.data, list) else [given])]

@@ -1,4 +1,4 @@
-"""A node type, and one that has been seen but not loaded."""
+"""A node type, and one that has been found but not loaded."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class NodeType(Struct, frozen=True, dict=True):
     """One node type.
 
     Attributes:
-        name: the word after `type:`: the stem of its file, or the path of a shader file that is used by path.
+        name: the value of `type:`: the stem of its file, or the path of a shader file that is used by path.
         shaders: the folder its shaders' names are relative to.
-        inherited: the same of the types it extends, the nearest first, for shaders that are not in `shaders`.
+        inherited: the same of the types that it extends, nearest first, for shaders that are not in `shaders`.
         missing: a placeholder for an unknown type, in a graph that is only shown.
-        text: of a shader file its header and its lines with those of its includes, without comments.
+        text: for a shader file, its header and lines with those of its includes, without comments.
     """
 
     name: str
@@ -47,7 +47,7 @@ class NodeType(Struct, frozen=True, dict=True):
 
     @cached_property
     def written(self) -> Mapping[str, WrittenPort]:
-        """Its textures and buffers: what it makes or continues."""
+        """The textures and buffers that it creates or continues."""
         return {name: port for name, port in self.cls.ports().items() if isinstance(port, WrittenPort)}
 
     @cached_property
@@ -62,7 +62,7 @@ class NodeType(Struct, frozen=True, dict=True):
         """Return the file of one of its shaders, and the folder that its includes in quotes must stay in.
 
         `<name>` is in `include`, the shipped one by default; any other in the type's own folder, or in that of a type
-        it extends. A missing one belongs in the first.
+        it extends. A missing file belongs in the first.
         """
         if name.startswith("<"):
             include = include or shared_includes()
@@ -81,7 +81,7 @@ class NodeType(Struct, frozen=True, dict=True):
 
     @property
     def word(self) -> str:
-        """A node id for the type, whose own name may be a path."""
+        """A node id for the type, whose name may be a path."""
         return re.sub(r"[^A-Za-z0-9_-]", "_", PurePath(self.name).stem)
 
 
@@ -95,9 +95,9 @@ def _is_there(file: Path) -> bool:
 
 
 class Listed(Struct, frozen=True):
-    """A module, or a shader file, that has been seen but not loaded; `module` is empty for a shader file.
+    """A module or shader file that has been found but not loaded; `module` is empty for a shader file.
 
-    `named` says in words where its plugin is named by path.
+    `named` is a phrase that says where its plugin is named by path.
     """
 
     module: str

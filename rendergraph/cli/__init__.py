@@ -1,4 +1,4 @@
-"""The command line: one file a verb, imported when it is called; nothing here but words, files and exit codes."""
+"""The command line: one module for each verb, imported when it runs. It parses, prints and sets exit codes only."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 def main(args: Sequence[str] | None = None) -> int:
     """Run one command line, by default the process's own, and return the exit code of design.md §7."""
     if args is None:
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy's threads wait for matrices that nothing here has
-        gc.set_threshold(100_000)  # what is made at the start stays: to look for cycles in it takes up to 20 ms
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # no matrix here is large enough for NumPy's threads
+        gc.set_threshold(100_000)  # start-up objects stay; searching them for cycles takes up to 20 ms
         supervise()
         atexit.register(_leave)
     from rendergraph.cli.app import main as run  # after the process is prepared
@@ -28,17 +28,17 @@ def main(args: Sequence[str] | None = None) -> int:
     try:
         return run(sys.argv[1:] if args is None else args)
     finally:
-        activity.note("")()  # what ends the process from now on is no crash
-        os.environ.pop(activity.DRAW_TIMEOUT, None)  # nor are other draws of a Python program limited
+        activity.note("")()  # from now on the end of the process is not a crash
+        os.environ.pop(activity.DRAW_TIMEOUT, None)  # do not limit later draws of a Python program
 
 
 def commands() -> dict[str, click.Command]:
-    """Return the verbs by name, in the order of `--help`: what the documentation of the command line is made from."""
+    """Return the verbs by name, in the order of `--help`; the command-line reference is generated from them."""
     from rendergraph.cli.app import VERBS, verb  # see above
 
     return {name: verb(name) for name in VERBS}
 
 
 def _leave() -> None:
-    if "OpenImageIO" not in sys.modules:  # whose bindings tell of every object that is still there
+    if "OpenImageIO" not in sys.modules:  # its bindings report every object that is still alive
         gc.freeze()

@@ -102,7 +102,7 @@ class _Verbs(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if args[0] not in VERBS and not args[0].startswith("-"):
-            from rendergraph.cli.suggestions import meant_by  # only needed where a verb is misspelt
+            from rendergraph.cli.suggestions import meant_by  # only needed for a misspelt verb
 
             meant = meant_by(args[0].lower(), "verbs") or (f"run {args[0]}" if _is_pipeline(args[0]) else None)
             hint = f"; did you mean '{meant}'?" if meant else suggestion(args[0], VERBS)
@@ -135,7 +135,7 @@ def group() -> None:
 
 
 def main(args: Sequence[str]) -> int:
-    """Run one command line, the words after the program's name, and return the exit code of design.md §7."""
+    """Run one command line, given without the program's name, and return the exit code of design.md §7."""
     as_json = "--json" in args
     set_quiet(False)
     try:
@@ -174,7 +174,7 @@ def main(args: Sequence[str]) -> int:
         if isinstance(error, ImportError) and not is_framework(error.name or ""):
             missing = isinstance(error, ModuleNotFoundError) and (error.name or "").partition(".")[0]
             fix = f"install it: pip install {missing}" if missing else "install it again"
-            text = f"a library that rendergraph needs does not load: {error}; {fix}"
+            text = f"a library that rendergraph needs cannot be loaded: {error}; {fix}"
             return fail([Problem("RG509", text)], 1, as_json)
         if os.environ.get("RENDERGRAPH_TRACEBACK"):
             raise
@@ -199,7 +199,7 @@ def _invoke(words: list[str]) -> int:
 
 
 def fail(problems: Sequence[Problem], code: int, as_json: bool) -> int:
-    """Print what went wrong and return the exit code, even where nothing can be printed."""
+    """Print the problems and return the exit code, even if nothing can be printed."""
     try:
         print_error(problems, code, as_json=as_json)
         _flush()
@@ -237,9 +237,9 @@ def _discard_stdout() -> None:
 
 @contextlib.contextmanager
 def _terminable() -> Iterator[None]:
-    """Let the first of SIGINT, SIGTERM and SIGHUP unwind: half-written files are removed, child processes ended.
+    """Unwind on the first SIGINT, SIGTERM or SIGHUP: remove half-written files and end child processes.
 
-    What is ignored, as SIGHUP under nohup, stays ignored.
+    Signals that are ignored, as SIGHUP under nohup, stay ignored.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -250,7 +250,7 @@ def _terminable() -> Iterator[None]:
     interruptions: list[BaseException] = []
 
     def stop(number: int, frame: FrameType | None) -> NoReturn:
-        for each in handled:  # unwinding is not to be interrupted; the supervisor ends what takes too long
+        for each in handled:  # unwinding must not be interrupted; the supervisor limits its time
             signal.signal(each, signal.SIG_IGN)
         interruptions.append(KeyboardInterrupt() if number == signal.SIGINT else Interruption(number))
         raise interruptions[0]
@@ -260,7 +260,7 @@ def _terminable() -> Iterator[None]:
         yield
     except BaseException as error:
         if interruptions and error is not interruptions[0]:
-            raise interruptions[0] from error  # on the way up it has become something else
+            raise interruptions[0] from error  # third-party code has replaced it
         raise
     finally:
         for number, handler in before.items():

@@ -23,9 +23,9 @@ _LIMITS = ("import-seconds", "pass-seconds", "memory")
 def init(folder: Path, as_json: bool) -> None:
     """Start a project in the current folder or in a new one.
 
-    A pipeline, a scene, a node with its shader and test, the settings file `rendergraph.toml`, which names the folder
-    of nodes, schemas for editors and a `.gitignore`. Inside the project all of them are found without options. No file
-    is ever overwritten; a `.gitignore` and schemas that are there stay.
+    Writes a pipeline, a scene, a node with its shader and test, the settings file `rendergraph.toml`, which names the
+    folder of nodes, schemas for editors and a `.gitignore`. Inside the project all of them are found without options.
+    No file is ever overwritten; an existing `.gitignore` and existing schemas are kept.
 
     \b
     Examples:
@@ -43,9 +43,9 @@ def init(folder: Path, as_json: bool) -> None:
 def copy(name: str, as_json: bool) -> None:
     """Copy a shipped pipeline, scene or node to edit.
 
-    It goes into the current folder. Pipelines and scenes keep their names, and are then used by path: `./NAME.yaml`. A
-    node becomes the type `my_NAME`, with its shaders. `pipeline:NAME`, `scene:NAME` or `node:NAME` says which, where a
-    name is ambiguous. No file is ever overwritten.
+    Writes the copy into the current folder. A pipeline or scene keeps its name; use it by path: `./NAME.yaml`. A node
+    becomes the type `my_NAME`, with its shaders. If a name is ambiguous, write `pipeline:NAME`, `scene:NAME` or
+    `node:NAME`. No file is ever overwritten.
 
     \b
     Examples:
@@ -66,8 +66,8 @@ def copy(name: str, as_json: bool) -> None:
 def new_node(name: str, kind: str, package: bool, as_json: bool) -> None:
     """Write a working node into the current folder.
 
-    A module, its shader, a pipeline that uses it and a test that passes, for you to change. In the folder of a project,
-    which `rendergraph init` starts, module and shader go into its folder of nodes. No file is ever overwritten.
+    Writes a module, its shader, a pipeline that uses it and a passing test as a starting point. In a project that
+    `rendergraph init` started, the module and the shader go into its folder of nodes. No file is ever overwritten.
 
     \b
     Examples:
@@ -80,7 +80,7 @@ def new_node(name: str, kind: str, package: bool, as_json: bool) -> None:
     node = new_node(name, kind, package=package)  # type: ignore[arg-type]  # click has checked the word
     print_files(node, {"node": node.name, "kind": node.kind}, as_json)
     if any("--plugin" in line for line in node.commands) and not package:
-        say("in the folder of a project, which `rendergraph init` starts, nodes are found without --plugin")
+        say("in a project that `rendergraph init` started, nodes are found without --plugin")
 
 
 def print_files(written: NewNode, about: dict[str, str], as_json: bool) -> None:
@@ -111,10 +111,10 @@ def check_node(
 ) -> None:
     """Validate a node of your own in every variant.
 
-    FILE is a Python module or a shader file. Checks docs and ranges, compiles the shaders with every choice and with
-    inputs connected and not, and renders them: the node must write all outputs that it declares, change nothing else,
-    and leak nothing. This happens in a process with limits. Exits with code 0 if the node is valid, else with code 3
-    and every mistake with its line.
+    FILE is a Python module or a shader file. Checks docs and ranges, compiles the shaders with every choice, with and
+    without optional inputs, and renders them. The node must write all outputs that it declares, change nothing else
+    and leak nothing. The check runs in a process with limits. Exits with code 0 if the node is valid; otherwise prints
+    every mistake with its line and exits with code 3.
 
     \b
     Examples:

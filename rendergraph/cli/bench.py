@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 @click.command("bench", no_args_is_help=True)
 @options.pipeline_options
 @click.option("-n", "--frames", type=click.IntRange(1, 100_000), default=30, show_default=True, help="Measured frames.")
-@click.option("--fps", type=options.POSITIVE, default=30.0, show_default=True, help="Frames a second.")
+@click.option("--fps", type=options.POSITIVE, default=30.0, show_default=True, help="Frames per second.")
 @options.alias_option
 @options.heap_option
-@click.option("--steps", is_flag=True, help="Time each step of a pass, too.")
+@click.option("--steps", is_flag=True, help="Also time each step of a pass.")
 @options.json_option
 @options.device_option
 @options.draw_timeout_option
@@ -33,8 +33,8 @@ def command(
 ) -> None:
     """Time each pass.
 
-    Renders frames and prints the median time of each pass, with its spread. All of the pipeline's outputs are
-    computed; one more frame is rendered beforehand, unmeasured. Times of a software renderer say nothing about GPUs.
+    Prints the median time of each pass over all frames, with its spread. All of the pipeline's outputs are computed.
+    One warm-up frame is rendered first and not measured. Times of a software renderer say nothing about GPUs.
 
     \b
     Examples:

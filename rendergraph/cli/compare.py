@@ -77,19 +77,19 @@ truth_options = options.together(
         "--reference-noise",
         type=click.FloatRange(0, min_open=True),
         metavar="PART",
-        help="Draw a reference that accumulates until its noise is this part of the smallest error.  [default: 0.1]",
+        help="Accumulate the reference until its noise is this fraction of the smallest error.  [default: 0.1]",
     ),
     click.option(
         "--reference-samples",
         type=click.IntRange(1),
         metavar="N",
-        help="Draw at most so many samples of each pixel of it.",
+        help="Maximum samples per pixel of the reference.",
     ),
     click.option(
         "--reference-seconds",
         type=click.FloatRange(0, min_open=True),
         metavar="SECONDS",
-        help="Draw it at most so long.  [default: 120]",
+        help="Maximum time to render the reference.  [default: 120]",
     ),
 )
 metric_option = click.option(
@@ -131,7 +131,7 @@ report_options = options.together(
     multiple=True,
     type=options.Parsed("'PATH=VALUE …'", options.settings),
     shell_complete=options.offered("settings"),
-    help="Compare the pipeline with these settings, several in one text; a single one with the unchanged pipeline.",
+    help="Add a variant with one or more settings. A single variant is compared with the unchanged pipeline.",
 )
 @reference_option
 @truth_options
@@ -169,11 +169,11 @@ def command(
 ) -> None:
     """Compare pictures, times and memory of pipelines.
 
-    All are rendered with one scene, one camera and at one size: those of the first pipeline, or of the options. Options
-    such as -s apply to all pipelines, but not to the reference. Times are medians of frames that the pipelines take
-    turns to render. A reference with the outputs `radiance` and `variance`, such as a path tracer, is drawn until its
-    noise is far below the errors, and kept on the disk for the next time. Pictures alone, without options that change
-    how they were made, are compared as they are.
+    All pipelines are rendered with the same scene, camera and size: those of the options, or of the first pipeline.
+    Options such as -s apply to all pipelines, but not to the reference. The pipelines take turns to render frames, and
+    times are medians. A reference with the outputs `radiance` and `variance`, such as a path tracer, accumulates until
+    its noise is far below the errors, and is cached on disk. If only pictures are given, and no options that change how
+    they were made, they are compared as they are.
 
     \b
     Examples:
@@ -281,7 +281,7 @@ def _with(settings: Sequence[str], selection: Selection) -> Pipeline:
 
 
 def _set_by(option: str, settings: Sequence[str], selection: Selection) -> Pipeline:
-    """Return a pipeline some of whose settings come from an option, where mistakes in them are located."""
+    """Return the pipeline with settings from an option; mistakes in them are located at this option."""
     from rendergraph.session import Pipeline
 
     def located(problem: Problem) -> Problem:
@@ -307,11 +307,11 @@ def load_reference(reference: str | None, select: options.Select) -> Path | Pipe
     if is_picture(reference):
         return Path(reference)
     selection = reference_selection(select(reference))
-    return _set_by("--reference", selection.sets, selection)  # it gets another scene, to which no warning applies
+    return _set_by("--reference", selection.sets, selection)  # it gets another scene, so its warnings do not apply
 
 
 def _write(comparison: Comparison, output: Path, crops: Sequence[Any], *, title: str, note: str) -> None:
-    """Write a comparison as the extension says: as a page, a figure or a table."""
+    """Write a comparison as a page, a figure or a table, by the extension."""
     suffix = output.suffix.lower()
     if suffix in _FIGURES:
         from rendergraph.compare.report.figure import save_figure
@@ -406,7 +406,7 @@ def comparison_text(comparison: Comparison) -> str:
 
 
 def truth_lines(comparison: Comparison) -> list[str]:
-    """Return the noise of a truth, and the technique to which each variant owes most of its error."""
+    """Return the noise of a ground truth, and the technique that causes most of each variant's error."""
     reference, share = comparison.reference, comparison.noise_share
     if reference.noise is None:
         return []

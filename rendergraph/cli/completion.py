@@ -1,4 +1,4 @@
-"""What a shell offers on TAB: pipelines, scenes, node ids, their parameters and values."""
+"""Shell completion of pipelines, scenes, node ids, their parameters and values."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _BREAKS = "=:"
 
 
 def _words(find: Callable[[Context, str], Iterable[str]], *, or_files: bool = False) -> Complete:
-    """Return what click calls to complete a word: the words that `find` returns for it and that begin with it."""
+    """Return a completion callback for click, which offers the words of `find` that begin with the typed text."""
 
     def complete(ctx: Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         from click.shell_completion import CompletionItem
@@ -63,7 +63,7 @@ def _cameras(ctx: Context, incomplete: str) -> Iterable[str]:
 
 
 def _settings(ctx: Context, incomplete: str) -> Iterable[str]:
-    """What `-s` takes: node ids, then their parameters and inputs, then values."""
+    """Return what `-s` takes: node ids, then their parameters and inputs, then values."""
     linked = _linked(ctx)
     if linked is None:
         return ()
@@ -111,7 +111,7 @@ def _values(linked: Linked, node: str, name: str) -> Iterator[str]:
 
 
 def _linked(ctx: Context) -> Linked | None:
-    """The pipeline of the command line typed so far; None where there is none or it cannot be linked."""
+    """Return the pipeline of the command line typed so far; None if there is none or it cannot be linked."""
     from rendergraph.session import Selection, stages
 
     named: Any = ctx.params.get("pipeline") or ctx.params.get("pipelines") or tuple(ctx.args)  # args: before a last -s
@@ -128,7 +128,7 @@ def _linked(ctx: Context) -> Linked | None:
 
 
 def install() -> None:
-    """Make bash complete words that contain `=`, and add no space after a word that goes on."""
+    """Make bash complete words that contain `=`, and add no space after one that ends in `=` or `.`."""
     from click.shell_completion import BashComplete, add_completion_class
 
     class Bash(BashComplete):

@@ -96,7 +96,7 @@ def _packages() -> dict[str, str | None]:
 
 
 def _advice(found: dict[str, Any], devices: list[dict[str, Any]], packages: dict[str, str | None]) -> list[str]:
-    """One sentence for each thing to do."""
+    """Return one sentence for each action to take."""
     advice = []
     missing = [name for name, version in packages.items() if version is None]
     if missing:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rendergraph.catalog import Catalog
     from rendergraph.edit import PipelineText
 
-# Operation to its words: at least and at most so many, as the help shows them.
+# By operation: minimum and maximum number of arguments, and the arguments as the help shows them.
 _OPERATIONS: Mapping[str, tuple[int, int, str]] = {
     "add": (2, 1000, "ID TYPE [NAME=VALUE]..."),
     "delete": (1, 1, "ID"),
@@ -45,9 +45,9 @@ def command(
 ) -> None:
     """Change a pipeline file: its nodes, links and parameters.
 
-    Comments, order and spelling of everything else stay byte for byte. The difference is printed, the file is written
-    as a whole, and the result is checked: with exit code 3 it is written but has mistakes, which are listed as by
-    `check`. In a file that extends another, what it inherits is changed by entries of its own.
+    Everything else, comments and order included, stays byte for byte. Prints the difference, writes the file as a whole
+    and checks the result. Exit code 3 means that the file was written but has mistakes, which are listed as by `check`.
+    In a file that extends another, inherited values are changed by new entries.
 
     The operations: `add ID TYPE [NAME=VALUE]...` with links and parameters by name, `delete ID` with the links to it,
     `rename ID NEW_ID`, `connect NODE.INPUT LINK...` (`outputs.NAME` is an output of the file), `disconnect NODE.INPUT`,
@@ -98,9 +98,9 @@ def command(
 def upgrade(file: Path, dry_run: bool, plugins: tuple[Path, ...], as_json: bool) -> None:
     """Rewrite a file of an earlier version.
 
-    FILE is a pipeline, which gets the version of its format if that is missing, or a shader, in which the old names of
-    shared includes and of what they declare (RG449) become the new ones. No node type, port or parameter has been
-    renamed yet. Everything else stays byte for byte.
+    FILE is a pipeline or a shader. A pipeline gets its format version if that is missing. In a shader, old names of
+    shared includes and of their declarations (RG449) are replaced. No node type, port or parameter has been renamed
+    yet. Everything else stays byte for byte.
 
     \b
     Examples:
@@ -136,7 +136,7 @@ def _opened(file: Path, catalog: Catalog) -> tuple[str, PipelineText]:
 def _finish(
     pipeline: PipelineText, before: str, dry_run: bool, plugins: tuple[Path, ...], as_json: bool, check: bool = True
 ) -> None:
-    """Show the difference, write the file, and say what `check` says about it."""
+    """Print the difference, write the file, and report what `check` finds in it."""
     from rendergraph.images.files import replace_text
     from rendergraph.session import Selection, stages
 

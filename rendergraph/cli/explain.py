@@ -26,23 +26,23 @@ Entry = dict[str, Any]
 
 @click.command("explain", no_args_is_help=True)
 @click.argument("topic", shell_complete=options.offered("topics"))
-@click.option("--glsl", is_flag=True, help="Print the node's program: what is in scope, and the final text.")
+@click.option("--glsl", is_flag=True, help="Print the node's program: the names in scope, and the final text.")
 @click.option(
     "--pipeline",
     metavar="PIPELINE",
     shell_complete=options.offered("pipelines"),
-    help="Pipeline that has the node TOPIC; with --glsl.",
+    help="Pipeline that contains the node TOPIC; requires --glsl.",
 )
-@click.option("--step", type=click.IntRange(min=0), metavar="N", help="Step of the node, as `plan` counts.")
+@click.option("--step", type=click.IntRange(min=0), metavar="N", help="Step of the node, numbered as by `plan`.")
 @options.selection_options
 @options.json_option
 def command(topic: str, glsl: bool, pipeline: str | None, step: int | None, select: Select, as_json: bool) -> None:
     """Explain a node, pipeline, scene, error or file format.
 
-    Environments are explained, too. `pipeline`, `scene`, `sweep`, `settings` and `header` list every key of that kind
-    of file. `Steps` or `Pipeline` explains a class or function of Python; `api` lists what nodes import, and `glsl`
-    what shaders include. The path of a file explains the pipeline, scene or node in it. With --glsl, TOPIC is a node
-    type, which is shown in a small pipeline, or a node of --pipeline; the options of `run` change either pipeline.
+    TOPIC may also be an environment. `pipeline`, `scene`, `sweep`, `settings` and `header` list every key of that kind
+    of file. `Steps` or `Pipeline` explains a Python class or function; `api` lists the names that nodes import, and
+    `glsl` those that shaders include. A file's path explains the pipeline, scene or node in it. With --glsl, TOPIC is a
+    node type, shown in a small pipeline, or a node of --pipeline; the options of `run` change either pipeline.
 
     \b
     Examples:
@@ -137,7 +137,7 @@ def _python_text(entry: Entry) -> str:
 
 
 def _environment(topic: str) -> tuple[Entry, str]:
-    """Describe a shipped environment, also as text; empty where the topic is none."""
+    """Describe a shipped environment, also as text; empty if the topic is not one."""
     from rendergraph.scene.environments import SHIPPED  # slower to import than what most topics need
 
     if topic not in SHIPPED:
@@ -148,7 +148,7 @@ def _environment(topic: str) -> tuple[Entry, str]:
 
 
 def _file(topic: str, select: Select, catalog: Any) -> tuple[Entry, str]:
-    """Describe the pipeline or scene that a topic names, also as text; empty where it names neither."""
+    """Describe the pipeline or scene that a topic names, also as text; empty if it names neither."""
     kind = reference.kind_of(topic)
     if kind == "pipeline":
         entry = reference.describe_pipeline(topic, options.link(select(topic)))
@@ -189,7 +189,7 @@ _MOST_ENTRIES = 40
 
 def _scene_text(entry: Entry) -> str:
     def listed(title: str, rows: list[tuple[Any, ...]], *columns: Any, **options: Any) -> str:
-        """A section with the first rows, and the number of the others."""
+        """Return a section with the first rows, and the number of the others."""
         more = len(rows) - _MOST_ENTRIES
         return section(title, rows[:_MOST_ENTRIES], *columns, **options) + (f"\n  and {more} more" if more > 0 else "")
 
@@ -291,7 +291,7 @@ _WIDE = 64
 
 
 def _program_text(entry: Entry) -> str:
-    """The program as GLSL; everything else is in comments."""
+    """Return the program as GLSL, with everything else in comments."""
     lines = [f"step {entry['step']} of {node_named(entry['node'], entry['type'])} in pipeline '{entry['pipeline']}'"]
     if len(entry["steps"]) > 1:
         lines.append("steps with a program; --step N selects one:")
@@ -299,7 +299,7 @@ def _program_text(entry: Entry) -> str:
             shaders = ", ".join(one["shaders"].values())
             lines.append(f"  {one['step']}  {one['kind']}  {shaders}  {one['label']}".rstrip())
     if entry["variants"] == 0:
-        lines.append("it draws nothing of this scene")
+        lines.append("it draws nothing in this scene")
     elif entry["variants"] > 1:
         differing = ", ".join(entry["differ"])
         lines.append(f"the first of {amount(entry['variants'], 'variant')}, which differ in {differing}")

@@ -112,12 +112,12 @@ def _report(sweep: Sweep | None, out: Path, count: int, *, as_json: bool) -> Non
     else:
         for name in rendered:
             emit(str(out / name))
-    for failure in failed:  # the report has it as a row; another worker would fail, too
+    for failure in failed:  # the report lists it; another worker would fail, too
         say(f"{failure.name} failed: {failure.text}", always=True)
 
 
 def _template(prepared: Prepared, sweep: Path, folder: Path, frames: range | None, chunk: int) -> str:
-    import yaml  # for this action alone
+    import yaml  # only for this action
 
     from rendergraph.compare.export.openjd import template
     from rendergraph.compare.runner import list_sweep

@@ -20,7 +20,7 @@ from rendergraph.errors import Problem, UsageError
     type=click.Path(path_type=Path, file_okay=False),
     metavar="DIR",
     required=True,
-    help="Folder to write; it is made if it does not exist.",
+    help="Folder to write; created if it does not exist.",
 )
 @click.option("--title", default="Pipelines", show_default=True, help="Heading of the index.")
 @options.json_option
@@ -52,9 +52,9 @@ def command(
     if len(selections) < len(pipelines):
         raise UsageError(Problem("RG500", "two of the pipelines have the same name; their pages would be one file"))
     if "index" in selections:
-        raise UsageError(Problem("RG500", "a pipeline called 'index' would take the place of the site's index"))
+        raise UsageError(Problem("RG500", "a pipeline called 'index' would overwrite the site's index"))
     for selection in selections.values():
-        options.linked(selection)  # the mistakes of all of them before the first is drawn
+        options.linked(selection)  # report all mistakes before the first picture
     folder.mkdir(parents=True, exist_ok=True)
     pages: dict[str, Exported] = {}
     with Gpu(device) as gpu:

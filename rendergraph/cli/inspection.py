@@ -27,7 +27,7 @@ _KINDS = ("pipeline", "scene", "sweep", "results", "results-csv")
 @options.pipeline_options
 @options.json_option
 @click.option(
-    "--profile", type=click.Choice(["guaranteed"]), help="Also require that every OpenGL 4.5 device can draw it."
+    "--profile", type=click.Choice(["guaranteed"]), help="Also require that every OpenGL 4.5 device can render it."
 )
 def check(selection: Selection, as_json: bool, profile: str | None) -> None:
     """Find every error, without a GPU.
@@ -85,12 +85,12 @@ def check(selection: Selection, as_json: bool, profile: str | None) -> None:
 @options.alias_option
 @options.heap_option
 @click.option("--shuffle", type=int, metavar="SEED", help="Use another legal order.")
-@click.option("--every-step", is_flag=True, help="Give each step that makes a kept value a row of its own.")
+@click.option("--every-step", is_flag=True, help="List each step that computes a kept value in a row of its own.")
 def plan(selection: Selection, as_json: bool, every_step: bool, **modes: Any) -> None:
     """Show order, lifetimes and memory, with reasons.
 
-    Lists the order of the steps, how long each texture lives, which textures share memory, and the bytes. Steps that
-    make values kept from frame to frame, such as tables and environment maps, share a row.
+    Lists the order of the steps, the lifetime of each texture, which textures share memory, and the bytes. Steps that
+    compute values kept from frame to frame, such as tables and environment maps, share a row.
 
     \b
     Examples:
@@ -120,7 +120,7 @@ def plan(selection: Selection, as_json: bool, every_step: bool, **modes: Any) ->
     "--format",
     "format_name",
     type=click.Choice(["text", "dot", "mermaid", "svg"]),
-    help="Format; by default that of the file's extension, else text.",
+    help="Format; by default that of the file's extension, or text.",
 )
 @click.option("-o", "--output", type=options.NamedPath(dir_okay=False), metavar="FILE", help="Write a file.")
 @options.json_option
@@ -154,8 +154,8 @@ def graph(selection: Selection, format_name: str | None, output: Path | None, as
 def config(selection: Selection, as_json: bool) -> None:
     """Print the resolved pipeline, with origins.
 
-    The file with `extends`, patches and settings applied, and beside each value the line it comes from. For a picture
-    that `rendergraph run` wrote (EXR or PNG), the pipeline that made it.
+    Prints the file with `extends`, patches and settings applied, and next to each value the line that it comes from.
+    For a picture that `rendergraph run` wrote (EXR or PNG), prints the pipeline that rendered it.
 
     \b
     Examples:
@@ -236,12 +236,12 @@ def diff(a: str, b: str, select: options.Select, svg: Path | None, as_json: bool
 @click.command("schema")
 @click.argument("what", default="pipeline", metavar="[pipeline|scene|sweep|results|results-csv|FILE|NODE]")
 @click.option("--glsl", is_flag=True, help="Print a shader of NODE as a complete file, for a GLSL checker.")
-@click.option("--shader", metavar="NAME", help="Which shader, if the node has several; with --glsl.")
+@click.option("--shader", metavar="NAME", help="Shader to print, if the node has several; requires --glsl.")
 @click.option(
     "--pipeline",
     metavar="PIPELINE",
     shell_complete=options.offered("pipelines"),
-    help="Pipeline that has the node NODE; with --glsl.",
+    help="Pipeline that contains the node NODE; requires --glsl.",
 )
 @options.plugin_option
 @click.option("-o", "--output", type=options.NamedPath(dir_okay=False), metavar="FILE", help="Write a file.")
@@ -257,14 +257,14 @@ def schema(
 ) -> None:
     """Print the JSON Schema of a kind of file, or a whole shader.
 
-    The schema of pipelines contains all installed nodes, and what shipped pipelines consist of, for files that extend
-    them. FILE is a pipeline: its schema also contains what it extends, its shader files, and for each input of its
-    nodes the links that fit. A node type with errors is included by name only, with a warning. `results` describes the
-    lines of a sweep's results.jsonl; `results-csv` is a Table Schema of its results.csv.
+    The schema of pipelines contains all installed nodes, and the contents of shipped pipelines for files that extend
+    them. If FILE is a pipeline, its schema also contains what it extends, its shader files, and the links that fit each
+    input of its nodes. A node type with errors is included by name only, with a warning. `results` describes the lines
+    of a sweep's results.jsonl; `results-csv` is a Table Schema of its results.csv.
 
-    With --glsl, NODE is a node type, which is shown in a small pipeline, a shader file, or a node of --pipeline. What
-    rendergraph writes before a shader's text, and what the shader includes, is in its place, and every line keeps the
-    number that it has in its file, so that another compiler's messages name the lines that you wrote.
+    With --glsl, NODE is a node type, shown in a small pipeline, a shader file, or a node of --pipeline. The file
+    contains everything that rendergraph adds and all includes. Every line keeps its number, so messages of another
+    compiler name the lines that you wrote.
 
     \b
     Examples:

@@ -1,7 +1,7 @@
-"""`rendergraph mcp`: the verbs for a coding assistant, by the Model Context Protocol, inside one folder.
+"""`rendergraph mcp`: serve the verbs to a coding assistant over the Model Context Protocol, inside one folder.
 
-An assistant is as untrusted as a file: what it names must be shipped or lie below the folder, links followed, and
-nothing is written there unless `--write` allows it.
+An assistant is as untrusted as a file: every file that it names must be shipped or lie below the folder, with symbolic
+links resolved, and nothing is written unless `--write` allows it.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-MOST_SIDE = 1024  # of a picture, which travels in a message, and which a CPU may have to render
+MOST_SIDE = 1024  # pictures travel in messages, and a CPU may have to render them
 _INSTRUCTIONS = """Renderers are YAML files, whose nodes are render passes. A `pipeline` is a shipped name (`forward`),
-a YAML file, or YAML text, such as `extends: forward` with changes. `settings` are texts such as `shadows.taps=4` or
-`scene.lights.key.intensity=2`. Begin with `explain` of `pipeline`."""
+a YAML file, or YAML text, such as `extends: forward` with changes. `settings` are strings such as `shadows.taps=4` or
+`scene.lights.key.intensity=2`. Start with `explain` for `pipeline`."""
 _PATH_LIKE = re.compile(r"[^\s\[\]{}:,\"'=]+")
 
 
@@ -45,8 +45,8 @@ _PATH_LIKE = re.compile(r"[^\s\[\]{}:,\"'=]+")
 def command(root: str, write: bool, as_json: bool) -> None:
     """Serve a coding assistant over standard input and output.
 
-    The Model Context Protocol offers it `nodes`, `explain`, `check`, `plan`, `run`, `compare` and `texture`, in one
-    folder and without writing files. It needs `pip install 'rendergraph[mcp]'`.
+    Offers `nodes`, `explain`, `check`, `plan`, `run`, `compare` and `texture` over the Model Context Protocol, in one
+    folder and without writing files. Requires `pip install 'rendergraph[mcp]'`.
 
     \b
     Examples:
@@ -60,21 +60,21 @@ def command(root: str, write: bool, as_json: bool) -> None:
     require("mcp", "mcp", "mcp")
     os.chdir(root)
     with contextlib.ExitStack() as stack:
-        if not write:  # what a truth keeps on the disk, too
+        if not write:  # nor any cached reference
             os.environ["RENDERGRAPH_CACHE"] = stack.enter_context(tempfile.TemporaryDirectory(prefix="rendergraph-"))
-        stack.enter_context(contextlib.redirect_stdout(data_stream()))  # it carries the messages
+        stack.enter_context(contextlib.redirect_stdout(data_stream()))  # stdout carries the messages
         server(Path.cwd(), write=write).run()
 
 
 def server(root: Path, *, write: bool = False) -> MCPServer:
-    """Return a server for a folder, which is the current one."""
+    """Return a server for `root`, which must be the current folder."""
     from mcp.server import MCPServer
     from mcp.server.mcpserver import Image
     from mcp.server.mcpserver.exceptions import ToolError
 
     from rendergraph.version import __version__
 
-    # One thread draws: a context of OpenGL belongs to the thread that created it.
+    # A single thread renders, because an OpenGL context belongs to the thread that created it.
     worker = ThreadPoolExecutor(1, thread_name_prefix="rendergraph-mcp")
     made = MCPServer("rendergraph", instructions=_INSTRUCTIONS, version=__version__, log_level="ERROR")
 
@@ -83,12 +83,12 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
     async def drawn(work: Callable[[], T]) -> T:
         try:
             return await asyncio.get_running_loop().run_in_executor(worker, work)
-        except (RendergraphError, KeyError) as error:  # what an assistant reads: the place of each mistake
+        except (RendergraphError, KeyError) as error:  # its text gives the assistant the place of each mistake
             raise ToolError(str(error)) from None
 
     @tool
     async def nodes() -> str:
-        """List the node types by family, each with a line."""
+        """List the node types by family, each with a summary."""
         return await drawn(lambda: _verb("nodes"))
 
     @tool
@@ -98,7 +98,7 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
 
     @tool
     async def check(pipeline: str, settings: list[str] | None = None) -> str:
-        """Find all mistakes in a pipeline without rendering it, each with its place and the way out."""
+        """Find all mistakes in a pipeline without rendering it, each with its place and fix."""
         return await drawn(lambda: _verb("check", *_words(root, pipeline, settings), text=pipeline))
 
     @tool
@@ -134,7 +134,7 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
         layer: int | None = None,
         channel: int | None = None,
     ) -> list[Any]:
-        """Return the texture of any port, `ao.occlusion`, as a picture in false colours, with its range and mean."""
+        """Return the texture of any port (`ao.occlusion`) as a picture in false colours, with its range and mean."""
 
         def work() -> list[Any]:
             found = _pipeline(root, pipeline, settings, size).render(taps=[port])
@@ -151,7 +151,7 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
         reference: str | None = None,
         size: tuple[int, int] = (320, 180),
     ) -> list[Any]:
-        """Compare pictures, times and memory of pipelines; `settings` has those of each. The first is the reference."""
+        """Compare pictures, times and memory of pipelines; `settings` has a list for each. The reference is first."""
 
         def work() -> list[Any]:
             from rendergraph.cli.compare import comparison_text
@@ -161,7 +161,7 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
 
             each = settings or [[] for _ in pipelines]
             if len(each) != len(pipelines):
-                raise UsageError(Problem("RG500", f"there are {len(pipelines)} pipelines, and settings of {len(each)}"))
+                raise UsageError(Problem("RG500", f"expected settings for {len(pipelines)} pipelines, got {len(each)}"))
             given = [_pipeline(root, name, own, size) for name, own in zip(pipelines, each, strict=True)]
             against = None if reference is None else _pipeline(root, reference, (), size)
             found = compare(given, against, frames=3)
@@ -191,7 +191,7 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
 
 
 def _verb(*words: str, text: str = "") -> str:
-    """Run a verb and return what it prints; of a text with several lines, which it reads from standard input."""
+    """Run a verb with `text` on its standard input, and return what it prints."""
     from mcp.server.mcpserver.exceptions import ToolError
 
     from rendergraph.cli.app import main
@@ -225,7 +225,7 @@ def _pipeline(root: Path, pipeline: str, settings: Sequence[str] | None, size: t
 
 
 def _inside(root: Path, *texts: str) -> list[str]:
-    """Return texts in which nothing that may be a path leads out of the folder."""
+    """Return the texts; raise InputError if anything in them that may be a path leads out of the folder."""
     for text in texts:
         for word in _PATH_LIKE.findall(text):
             if not is_name(word) and ("/" in word or ".." in word or "~" in word):

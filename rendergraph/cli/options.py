@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 F = TypeVar("F", bound=Callable[..., Any])
 
 Select: TypeAlias = "Callable[[str], Selection]"
-"""Returns the selection of a pipeline by its name, with everything that the options say."""
+"""Returns the selection for a pipeline's name, with all options applied."""
 
 _NAME = r"[A-Za-z_][A-Za-z0-9_-]*"
 _NODE = rf"{_NAME}(?:/{_NAME})*"
@@ -43,9 +43,9 @@ class Target(Struct, frozen=True):
 
 
 class Parsed(click.ParamType):  # type: ignore[type-arg]  # generic in new versions of click only
-    """A value that a function reads from text; the function's ValueError is the message.
+    """A value that a function parses from text; its ValueError becomes the message.
 
-    A function that is given as `module:function` is imported when there is a value.
+    A function given as `module:function` is imported when there is a value.
     """
 
     def __init__(self, name: str, parse: Callable[[str], Any] | str) -> None:
@@ -154,7 +154,7 @@ def _positive(text: str) -> float:
 
 def _share(text: str) -> float:
     if not re.fullmatch(r"0?\.\d{1,9}|[01](\.0*)?", text):
-        raise ValueError(f"'{text}' is not a share from 0 to 1, as in 0.5")
+        raise ValueError(f"'{text}' is not a number from 0 to 1, as in 0.5")
     return float(text)
 
 
@@ -181,7 +181,7 @@ _PATH = NamedPath()
 
 
 def offered(kind: str) -> Callable[[click.Context, click.Parameter, str], list[Any]]:
-    """Return what completes a word: a function of `rendergraph.cli.completion`, imported when a shell asks."""
+    """Return a completion callback, which imports a function of `rendergraph.cli.completion` when a shell asks."""
 
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
         completion = importlib.import_module("rendergraph.cli.completion")
@@ -210,10 +210,10 @@ heap_option = click.option(
     "--heap", is_flag=True, help="Let textures of any size and format share memory, where the device supports it."
 )
 plugin_option = click.option(
-    "--plugin", "plugins", multiple=True, type=_PATH, metavar="PATH", help="Node module or folder of them; runs code."
+    "--plugin", "plugins", multiple=True, type=_PATH, metavar="PATH", help="Node module or a folder of them; runs code."
 )
 
-device_option = click.option("--device", metavar="NUMBER", type=int, help="GL device, as `doctor` numbers them.")
+device_option = click.option("--device", metavar="NUMBER", type=int, help="GL device number, as listed by `doctor`.")
 scene_option = click.option(
     "--scene",
     metavar="FILE",
@@ -234,7 +234,7 @@ draw_timeout_option = click.option(
     metavar="SECONDS",
     expose_value=False,
     callback=_limit_draws,
-    help="Exit with code 1 if drawing a frame takes longer, and name the step.",
+    help="Exit with code 1 and name the step if rendering a frame takes longer.",
 )
 executor_options = together(
     click.option(
@@ -259,28 +259,28 @@ SELECTION_OPTIONS = {
         "--camera",
         metavar="NAME",
         shell_complete=offered("cameras"),
-        help="Camera of the scene to render from, or a camera in words: 'eye=0,1,5 target=0,1,0 fov=40'.",
+        help="Name of one of the scene's cameras, or a new camera: 'eye=0,1,5 target=0,1,0 fov=40'.",
     ),
     "view": click.option(
-        "--view", metavar="NAME", help="View of the file's `views`: its camera, frame and environment, if not given."
+        "--view", metavar="NAME", help="View from the file's `views`: sets camera, frame and environment unless given."
     ),
     "shutter": click.option(
         "--shutter",
         type=Parsed("SHARE", _share),
-        help="How much of a frame's time the camera's shutter is open, 0 to 1, for motion blur.",
+        help="Fraction of a frame's time for which the shutter is open, 0 to 1, for motion blur.",
     ),
     "environment": click.option(
         "--environment",
         type=_PATH,
         metavar="FILE",
         shell_complete=offered("environments"),
-        help="Environment map: a shipped name, .hdr or .exr, or `none` for the file's own lights alone.",
+        help="Environment map: a shipped name, .hdr or .exr, or `none` to use only the file's own lights.",
     ),
     "variant": click.option(
-        "--variant", metavar="NAME", help="Variant of a glTF file, with other materials; `explain FILE` lists them."
+        "--variant", metavar="NAME", help="Material variant of a glTF file; `explain FILE` lists them."
     ),
     "ground": click.option(
-        "--ground", is_flag=True, help="Put a ground below the scene that shows the environment and receives shadows."
+        "--ground", is_flag=True, help="Add a ground below the scene that shows the environment and receives shadows."
     ),
     "transparent": click.option(
         "--transparent",
@@ -305,10 +305,10 @@ SELECTION_OPTIONS = {
         multiple=True,
         type=_PATH,
         metavar="DIR",
-        help="Another folder that files may be read from.",
+        help="Another folder from which files may be read.",
     ),
     "limits": click.option(
-        "--limit", "limits", multiple=True, type=LIMIT, help="Raise a safety limit, as error messages name it."
+        "--limit", "limits", multiple=True, type=LIMIT, help="Raise a safety limit, named as in error messages."
     ),
     "plugins": plugin_option,
 }
@@ -316,7 +316,7 @@ SELECTION_OPTIONS = {
 
 
 def pipeline_options(function: F) -> F:
-    """Add the argument PIPELINE, and everything that changes a pipeline; the verb gets both as `selection`."""
+    """Add the argument PIPELINE and all options that change a pipeline; the verb gets them as `selection`."""
 
     @wraps(function)
     def selected(*, pipeline: str, select: Select, **given: Any) -> None:
@@ -326,7 +326,7 @@ def pipeline_options(function: F) -> F:
 
 
 def selection_options(function: F) -> F:
-    """Add everything that changes a pipeline; the verb gets `select`, which takes the pipeline's name."""
+    """Add all options that change a pipeline; the verb gets `select`, which takes the pipeline's name."""
 
     @wraps(function)
     def selecting(**given: Any) -> None:
@@ -358,7 +358,7 @@ def link(selection: Selection) -> Linked:
 
 
 def extensions(plugins: tuple[Path, ...]) -> Extensions:
-    """Return what plugins add beside node types; print what is wrong with it as warnings."""
+    """Return what plugins add besides node types; print mistakes in it as warnings."""
     from rendergraph.catalog import Catalog
 
     found = Catalog.discover(plugins).extensions
@@ -376,7 +376,7 @@ def sketch(selection: Selection) -> Linked:
 
 
 def exit_if_missing(*sketches: Linked) -> None:
-    """Exit as for a wrong file where node types are missing, after everything else was printed."""
+    """Exit with code 3 if node types are missing; call this when everything else is printed."""
     if any(linked.missing for linked in sketches):
         click.get_current_context().exit(InputError.exit_code)
 

@@ -22,7 +22,7 @@ _RED, _YELLOW, _BOLD, _PLAIN = "\x1b[1;31m", "\x1b[1;33m", "\x1b[1m", "\x1b[0m"
 _CONTROL = "[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]"
 
 _SCREENFUL = 10
-"""Errors that are printed, of three lines each; `--json` lists all."""
+"""Maximum number of errors to print, three lines each; `--json` lists all."""
 _DATA: ContextVar[TextIO | None] = ContextVar("data")
 """The process's stdout while a verb runs."""
 
@@ -59,12 +59,12 @@ class _Verbosity:
 
 
 def set_quiet(quiet: bool) -> None:
-    """Print nothing but errors on stderr from now on, or everything again."""
+    """From now on, print only errors to stderr, or everything again."""
     _Verbosity.quiet = quiet
 
 
 def say(text: str, *, always: bool = False) -> None:
-    """Print a line for people to stderr; `always` where it is the reason for the exit code."""
+    """Print a line for people to stderr; `always` if it is the reason for the exit code."""
     if always or not _Verbosity.quiet:
         _write(_printable(text, sys.stderr))
 
@@ -133,7 +133,7 @@ def say_summary(report: dict[str, Any]) -> None:
 
 
 def print_error(problems: Sequence[Problem], exit_code: int, *, as_json: bool) -> None:
-    """Print why a verb stopped: in words on stderr, and as the document of `--json` on stdout."""
+    """Print why a verb stopped: as text on stderr, and as the document of `--json` on stdout."""
     for problem in problems[:_SCREENFUL]:
         print_problem(problem)
     if (more := len(problems) - _SCREENFUL) > 0:
@@ -150,7 +150,7 @@ def error_document(problems: Sequence[Problem], exit_code: int) -> dict[str, Any
 
 
 def progress_bar(total: int) -> Bar:
-    """Return the bar of a run of so many frames, which shows nothing but on a terminal."""
+    """Return the progress bar for `total` frames, which is shown only on a terminal."""
     from rendergraph.session.progress import Bar
 
     return Bar("frames", shown=total > 1 and on_terminal())
@@ -162,7 +162,7 @@ def on_terminal() -> bool:
 
 
 def table(rows: Sequence[Sequence[object]], heads: Sequence[str] = (), *, right: Sequence[int] = ()) -> str:
-    """Return aligned columns, on a terminal no wider than it is."""
+    """Return aligned columns, on a terminal limited to its width."""
     stream = data_stream()
     if stream is None or not stream.isatty():
         return formatting.table(rows, heads, right=right)
@@ -174,7 +174,7 @@ def table(rows: Sequence[Sequence[object]], heads: Sequence[str] = (), *, right:
 def section(
     title: str, content: str | Sequence[Sequence[object]], heads: Sequence[str] = (), *, right: Sequence[int] = ()
 ) -> str:
-    """Return a title with its text or table indented below; nothing without content."""
+    """Return a title with its text or table indented below; empty without content."""
     text = content if isinstance(content, str) else table(content, heads, right=right)
     lines = [f"  {line}".rstrip() for line in text.rstrip().splitlines()]
     return "\n".join([*([title] if title else []), *lines]) if lines else ""
@@ -190,7 +190,7 @@ def amount(count: int, one: str, many: str = "") -> str:
 
 
 def _printable(text: str, stream: Any) -> str:
-    """Text that the stream's encoding can hold, without control characters, which would act on a terminal."""
+    """Return text that the stream can encode, without control characters, which a terminal would execute."""
     if not text.isprintable():
         text = re.sub(_CONTROL, lambda found: repr(found[0])[1:-1], text)
     encoding = getattr(stream, "encoding", None) or "utf-8"

@@ -1,6 +1,6 @@
 """Examine GL in a child process of `doctor`, because a broken driver may crash it; the answer is JSON on stdout.
 
-Without an argument it lists the EGL devices, with a number it opens that one.
+Without an argument it lists the EGL devices; with a number it opens that device.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def _main() -> None:
             print(json.dumps(context(int(sys.argv[1]))))
         except RendergraphError as error:
             print(json.dumps({"problem": "; ".join(problem.message for problem in error.problems)}))
-        except Exception as error:  # the doctor reports whatever it meets
+        except Exception as error:  # `doctor` reports any failure
             print(json.dumps({"problem": f"{type(error).__name__}: {error}"}))
         return
     try:

@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 @click.option(
     "--frames",
     type=options.FRAMES_OR_CLIP,
-    help="Frames to render, or `clip` for the scene's motion once, as films by default; `####` in a file name becomes "
-    "the number.",
+    help="Frames to render, or `clip` for the scene's motion once (the default of films); `####` in a file name "
+    "becomes the number.",
 )
-@click.option("--seconds", type=options.POSITIVE, help="Render so many seconds from frame 1 on.")
-@click.option("--turntable", is_flag=True, help="Take the camera once around its target; 4 seconds by default.")
-@click.option("--resume", is_flag=True, help="Leave out numbered frames that an interrupted run has written.")
+@click.option("--seconds", type=options.POSITIVE, help="Render this many seconds from frame 1 on.")
+@click.option("--turntable", is_flag=True, help="Move the camera once around its target; 4 seconds by default.")
+@click.option("--resume", is_flag=True, help="Skip numbered frames that an interrupted run has already written.")
 @click.option("--fps", type=options.POSITIVE, help="Frames per second.  [default: 30]")
 @click.option(
     "--subframes",
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
 @options.executor_options
 @options.json_option
 @options.device_option
-@click.option("--watch", is_flag=True, help="Keep running, and render again whenever a file changes that was read.")
+@click.option("--watch", is_flag=True, help="Keep running, and render again whenever an input file changes.")
 @click.option(
     "--reuse/--no-reuse",
     default=None,
@@ -212,7 +212,7 @@ def _read(
 
 
 def _resumed(expanded: Expanded, targets: Sequence[Target]) -> Expanded:
-    """Return the same from the first frame on of which a file is missing."""
+    """Return the run without the frames before the first one that lacks a file."""
     from rendergraph.images import is_numbered, numbered
     from rendergraph.session.picture_metadata import frame_metadata, metadata, pipeline_metadata, turntable_metadata
 
@@ -221,7 +221,7 @@ def _resumed(expanded: Expanded, targets: Sequence[Target]) -> Expanded:
         raise UsageError(Problem("RG500", text))
     options, frames = expanded.options, expanded.options.frames
     film = pipeline_metadata(expanded.linked) | turntable_metadata(expanded)
-    # Where a turntable's camera is in a frame follows from its circle.
+    # The camera of a turntable's frame follows from the turntable's own metadata.
     free = {"versions", "device", *(["camera"] if options.turntable else [])}
     for number in frames:
         paths = [numbered(target.path, number) for target in targets]
@@ -237,12 +237,12 @@ def _resumed(expanded: Expanded, targets: Sequence[Target]) -> Expanded:
                 text = f"differs from this film in its {max(other)}; without --resume all frames are rendered again"
                 raise InputError(Problem("RG512", text, Place(str(path))))
     else:
-        frames = frames[-1:]  # everything is there; the report is that of the last one
+        frames = frames[-1:]  # all exist; the report describes the last one
     return replace(expanded, options=replace(expanded.options, frames=frames))
 
 
 def _default(source: str, ending: str) -> Path:
-    """The file without -o; a picture that is rendered again is not overwritten."""
+    """Return the file to write without -o; a picture given as PIPELINE is not overwritten."""
     from rendergraph.session.picture_metadata import is_picture
 
     if is_picture(source):
@@ -312,7 +312,7 @@ def _draw(
 
 
 def _with_sheet(files: Sequence[Saved], targets: Sequence[Target], path: Path) -> list[Saved]:
-    """The files with those of the contact sheet as viewable pictures, and the sheet."""
+    """Return the files, those of the contact sheet as viewable pictures, and the sheet."""
     from rendergraph import images
 
     viewed = images.PictureInfo("display_color", "rgba8", "display")
@@ -367,7 +367,7 @@ def draw_in_parts(
     expanded: Expanded, targets: Sequence[Target], farm: Executor, *, warnings: Warnings, quiet: bool
 ) -> dict[str, Any]:
     """Render and write everything, and return the document of `--json`. Paths are printed unless `quiet`."""
-    import dataclasses  # --help needs none
+    import dataclasses  # not needed by --help
 
     from rendergraph import images
     from rendergraph.farm.frames import FrameFile, RenderedFrame, render_chunks, split_frames

@@ -1,4 +1,4 @@
-"""What somebody probably meant who typed an option that a verb does not have."""
+"""Suggestions for verbs and options that do not exist."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ _FLOOR = 0.7
 
 
 def meant_by(word: str, kind: str) -> str | None:
-    """Return what stands for a word of another program under `meanings`, `needless` or `verbs` of the table."""
+    """Return the entry for another program's word in `meanings`, `needless` or `verbs` of the table."""
     table = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
     return next((advice for advice, words in table[kind].items() if word in words.split()), None)
 
 
 def unknown_option(error: click.NoSuchOption, context: click.Context) -> str:
     name = error.option_name
-    if not name.startswith("--"):  # click found only the first letter of `-width`
+    if not name.startswith("--"):  # click reports only the first letter of `-width`
         name = next((word for word in context.obj or () if word.startswith(name)), name)
     return f"unknown option '{name}'{_meant(name, context)}"
 
@@ -30,7 +30,7 @@ def _meant(name: str, context: click.Context) -> str:
     word = name.lstrip("-").partition("=")[0].lower().replace("_", "-")
     own = _options(context.command)
     if (advice := meant_by(word, "meanings")) is not None:
-        # Other verbs than `run` write other files than pictures.
+        # Only `run` writes pictures.
         picture = advice.startswith("-o ") and "." in advice and context.command.name != "run"
         known = advice.startswith("rendergraph") or (advice.partition(" ")[0] in own and not picture)
         return f"; did you mean '{advice}'" + ("?" if known else " of `rendergraph run`?")

@@ -1,8 +1,8 @@
-"""The process that the shell waits for: it forks the worker, which does everything, and exits as that ends.
+"""The process that the shell waits for: it forks the worker, which does everything, and exits as the worker does.
 
-While a driver renders or compiles, Python handles no signal; when a driver crashes, nothing in its process is left to
-say so. The supervisor is never in a driver. It passes signals on, kills a worker that does not end, and reports a crash
-with the worker's activity. It costs a fork before anything is imported, half a millisecond.
+While a driver renders or compiles, Python handles no signals, and after a driver crash its process cannot report
+anything. The supervisor never calls a driver. It forwards signals, kills a worker that does not exit, and reports a
+crash with the worker's activity. It costs a fork before anything is imported, half a millisecond.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from collections.abc import Set as AbstractSet
 from rendergraph import activity, system
 
 PATIENCE = 1.2
-"""Seconds from a signal to the end: finished files are on the disk by then, and files appear whole or not at all."""
+"""Seconds from a signal to SIGKILL; finished files are on disk by then, and no file appears half-written."""
 
 
 def supervise() -> None:
-    """Return in the worker, a new process, with signals that end it silently; called once, before there are threads."""
+    """Fork, and return only in the worker, with signals that end it silently; call once, before threads exist."""
     if sys.platform != "linux":
-        return  # no other system has sigtimedwait and prctl, and OpenGL 4.5 on EGL
+        return  # only Linux has sigtimedwait, prctl and OpenGL 4.5 on EGL
     ending = {n for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if signal.getsignal(n) is not signal.SIG_IGN}
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_BLOCK, {*ending, signal.SIGCHLD})
@@ -33,7 +33,7 @@ def supervise() -> None:
     for number in ending:
         signal.signal(number, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {*ending, signal.SIGCHLD})
-    system.end_with_parent(supervisor)  # takes 2 ms, in which Ctrl-C is already heard
+    system.end_with_parent(supervisor)  # takes 2 ms; Ctrl-C already works
     activity.note("preparing")()
 
 
@@ -56,7 +56,7 @@ def _wait(worker: int, ending: AbstractSet[int]) -> int:
 
 
 def _exit_code(code: int, signalled: int, ending: AbstractSet[int]) -> int:
-    """Return the exit code for the worker's; say why where it has not ended by itself."""
+    """Return the exit code for that of the worker; if it was killed or crashed, report why."""
     during = activity.during()
     if code >= 0 and not (code and during):
         return code
@@ -68,12 +68,12 @@ def _exit_code(code: int, signalled: int, ending: AbstractSet[int]) -> int:
         os.write(2, b"interrupted\n" if 128 + number == INTERRUPTED else b"terminated\n")
         return 128 + number
     if code == -signal.SIGALRM:
-        text = f"--draw-timeout passed{during}; allow more, or draw less at a time"
+        text = f"--draw-timeout exceeded{during}; allow more, or draw less at a time"
     elif code == -signal.SIGKILL:
         text = f"the process was killed (SIGKILL){during}; the system does so when memory runs out"
     else:
         how = f"crashed ({signal.Signals(-code).name})" if code < 0 else f"was ended by a library (exit code {code})"
-        text = f"the process {how}{during}; too little memory can cause this, or a fault of the driver: "
+        text = f"the process {how}{during}; too little memory can cause this, or a driver bug: "
         text += "try a smaller --size, or another driver"
     return fail([Problem("RG622", text)], 1, as_json="--json" in sys.argv)
 

@@ -38,7 +38,7 @@ def _group(text: str) -> tuple[str, ...]:
     multiple=True,
     type=options.Parsed("PATH=V,V,…", "rendergraph.compare.space:parse_axis"),
     shell_complete=options.offered("settings"),
-    help="Values of a path that -s takes: 8,16, or 8:64:8, log:0.1:10:5; 0.1:2 for --samples.",
+    help="Values of a path that -s takes: 8,16, 8:64:8 or log:0.1:10:5; with --samples 0.1:2.",
 )
 @click.option(
     "--zip",
@@ -49,7 +49,7 @@ def _group(text: str) -> tuple[str, ...]:
 )
 @click.option("--samples", type=click.IntRange(1, 10_000), metavar="N", help="Render N samples, not all combinations.")
 @click.option(
-    "--sampling", type=click.Choice(["latin", "random"]), help="One sample in each part of every axis, or anywhere."
+    "--sampling", type=click.Choice(["latin", "random"]), help="One sample per interval of each axis, or random ones."
 )
 @click.option("--seed", type=click.IntRange(0), metavar="N", help="Random seed.  [default: 0]")
 @click.option(
@@ -74,7 +74,7 @@ def _group(text: str) -> tuple[str, ...]:
 @click.option(
     "--budget", type=click.IntRange(1, 10_000), metavar="N", help="Maximum number of runs of --minimise.  [default: 50]"
 )
-@click.option("--csv", "as_csv", is_flag=True, help="Write results.csv, too: a row for each run.")
+@click.option("--csv", "as_csv", is_flag=True, help="Also write results.csv, with a row for each run.")
 @shared.reference_option
 @shared.truth_options
 @shared.metric_option
@@ -101,10 +101,10 @@ def command(
 ) -> None:
     """Render and measure every combination of parameters.
 
-    PIPELINE is a pipeline, or a file with `sweep: 1`, `pipeline`, `axes`, and other keys, see `explain sweep`; options
-    override them. A path is what -s takes: a parameter, an input, a node's type. Commas inside brackets belong to
+    PIPELINE is a pipeline, or a file with `sweep: 1`, `pipeline`, `axes` and other keys (see `explain sweep`), which
+    options override. A path is what -s takes: a parameter, an input or a node's type. Commas inside brackets belong to
     a value; ranges include both ends. Passes that several runs share are executed once. With --json, stderr has a line
-    of JSON for each event: the runs done, the worker, the speed, and the seconds left.
+    of JSON for each event: runs done, worker, speed and seconds left.
 
     \b
     Examples:
@@ -207,7 +207,7 @@ def _file(name: str) -> SweepFile | None:
 
 @contextmanager
 def at_its_lines(file: SweepFile | None) -> Iterator[None]:
-    """Relocate mistakes in what a sweep's file says about paths to its lines."""
+    """Relocate mistakes in the paths of a sweep's file to its lines."""
     try:
         yield
     except InputError as error:
@@ -216,7 +216,7 @@ def at_its_lines(file: SweepFile | None) -> Iterator[None]:
 
 def _space(file: SweepFile | None, axes: tuple[Axis, ...], **sampling: Any) -> Space:
     """Return the axes of a file and of the options, which override those of the file."""
-    import dataclasses  # --help needs none
+    import dataclasses  # not needed by --help
 
     from rendergraph.compare import Space
 

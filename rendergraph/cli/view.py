@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @click.command("view", no_args_is_help=True)
 @options.pipeline_options
-@click.option("--against", metavar="PIPELINE", help="Pipeline to compare with, under a slider.")
+@click.option("--against", metavar="PIPELINE", help="Pipeline to compare with, using a slider.")
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port to serve at; any free one by default.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to serve at.")
 @click.option("--allow-remote", is_flag=True, help="Allow a --host that other machines can reach; see below.")
@@ -57,7 +57,7 @@ def command(
     """Show a pipeline in a browser and change its parameters live.
 
     Prints an address and opens it. Changes made on the page are saved as a variant in the current folder; input files
-    are watched. Ctrl-C ends it.
+    are watched. Ctrl-C stops it.
 
     Anyone who has the address can use the page. With --allow-remote and a --host that other machines can reach, that
     is everyone who can read the network traffic, which is not encrypted: prefer an SSH tunnel.
@@ -111,7 +111,7 @@ def command(
 
 
 def _open(url: str) -> None:
-    """Open a browser, where there is a display to show it on."""
+    """Open a browser if there is a display."""
     import os
     import sys
     import webbrowser

@@ -2,7 +2,7 @@
 
 Files are polled (`stamps`): a few dozen `stat` calls ten times a second cost nothing measurable, work on every file
 system, network and container included, and follow a file that an editor replaces by another of its name. Files that the
-last attempt looked for in vain are watched, too, such as a missing include.
+last attempt did not find, such as a missing include, are watched, too.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def _creation_counts(gpu: Gpu) -> dict[str, int]:
 
 
 def watch_and_render(draw: Draw, device: int | None, *, as_json: bool) -> None:
-    """Render now and after every change; raises where the first picture fails and no edit of a file could fix it."""
+    """Render now and after every change; raise if the first picture fails and no edit of a file could fix it."""
     from rendergraph.session.gpu import Gpu
 
     reported: tuple[str, ...] = ()

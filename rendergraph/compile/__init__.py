@@ -1,4 +1,4 @@
-"""Plan to programs, framebuffers and a flat list of calls: everything a frame does, looked up and allocated before."""
+"""Compile a plan into programs, framebuffers and a flat list of calls; a frame only executes this list."""
 
 from __future__ import annotations
 

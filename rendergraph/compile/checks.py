@@ -1,4 +1,4 @@
-"""What a linked program uses, compared with what its step provides; mistakes are at the shader's own line."""
+"""Compare what a linked program uses with what its step provides; mistakes are located in the shader."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from rendergraph.program import (
 from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import BufferDesc
 
-# Text: it takes a millisecond to compile, and most pipelines declare no vertices of their own.
+# A string, because compiling it takes a millisecond, and most pipelines declare no vertices of their own.
 _FORMAT = r"(?P<count>\d*)(?P<kind>[fiux])(?P<bytes>[1248]?)(?P<step>(?:/[vi])?)\Z"
 _ROUNDED = 16  # bytes that some drivers round a block's size up to
 
@@ -38,10 +38,10 @@ def check_program(
     sampled: Collection[str],
     cls: type[Node],
 ) -> None:
-    """Raise the mistakes of the first check that finds some; drivers would read and write garbage without a word.
+    """Raise the mistakes of the first check that finds any; drivers would read and write garbage silently.
 
     Args:
-        uniforms: name to value of all that the step sets.
+        uniforms: all uniforms that the step sets, name to value.
         blocks: names of the blocks that have a binding point.
         sampled: names of the textures that the step binds.
     """
@@ -69,7 +69,7 @@ def _uniforms(
     texts: Texts,
     cls: type[Node],
 ) -> Iterator[Problem]:
-    """A sampler that nothing is bound to would silently read another pass's texture, an unset uniform is 0."""
+    """Find unbound samplers, which would silently read another pass's texture, and unset uniforms, which are 0."""
     uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
     images = {use.name for use in uses if use.use == "image"}
     files = ", ".join(file for _, file in step.shaders)
@@ -86,7 +86,7 @@ def _uniforms(
 
 
 def uniform_mismatch(uniform: Uniform, value: Any) -> str | None:
-    """What a uniform and the value that it is given disagree about: the driver would read beyond the numbers."""
+    """Return how a uniform and its value disagree; the driver would read beyond the value."""
     numbers = value if isinstance(value, tuple | list) else (value,)
     if len(numbers) % uniform.number_count or not 1 <= len(numbers) // uniform.number_count <= uniform.size:
         array = f"[{uniform.size}]" if uniform.size > 1 else ""
@@ -98,7 +98,7 @@ def uniform_mismatch(uniform: Uniform, value: Any) -> str | None:
 
 
 def _samplers(step: Step, program: Program, resources: Mapping[str, Resource], texts: Texts) -> Iterator[Problem]:
-    """A sampler of another kind than its texture reads black, silently."""
+    """Find samplers of another kind than their texture, which would silently read black."""
     for name, read in named_reads(step):
         uniform = program.uniforms.get(name)
         if read.use == "sample" and uniform is not None:
@@ -107,14 +107,14 @@ def _samplers(step: Step, program: Program, resources: Mapping[str, Resource], t
 
 
 def _blocks(step: Step, program: Program, given: Collection[str], texts: Texts) -> Iterator[Problem]:
-    """A buffer that nothing is bound to would be written nowhere, or over another node's."""
+    """Find unbound buffers, writes to which would be lost or overwrite another node's buffer."""
     for name in program.block_names:
         if name not in given:
             yield _placed(step.problem("RG430", unbound_block(step, name)), name, texts)
 
 
 def _elements(step: Step, program: Program, resources: Mapping[str, Resource], texts: Texts) -> Iterator[Problem]:
-    """A block whose elements lie elsewhere than declared would read other fields, or others than NumPy wrote."""
+    """Find blocks whose element layout differs from the declaration, and so from what NumPy wrote."""
     uses: dict[str, Read | Write] = {**dict(named_reads(step)), **{write.name: write for write in step.writes}}
     for name in program.storage.keys() & uses.keys():
         desc = resources[uses[name].resource].desc
@@ -133,19 +133,19 @@ def _elements(step: Step, program: Program, resources: Mapping[str, Resource], t
 def _outputs(
     step: Step, program: Program, cls: type[Node], resources: Mapping[str, Resource], texts: Texts
 ) -> Iterator[Problem]:
-    """A program must write every target, and nothing else, in the kind of number that the target holds."""
+    """Check that a program writes every target, and nothing else, with the numeric type of the target."""
     written = outputs_of(program)
     yield from (_placed(one, one.subject, texts) for one in unfit_outputs(step, written, cls, resources))
     targets = [write.name for write in step.writes if write.use == "color"]
     shader = dict(step.shaders).get("fragment", "the step")
-    for name in targets if len(targets) > 1 else ():  # a single one may have any name, or be discarded everywhere
+    for name in targets if len(targets) > 1 else ():  # a single output may have any name, or always be discarded
         if name not in written:
             hint = suggestion(name, written.keys() - set(targets))
             yield step.problem("RG437", f"{shader} writes no output '{name}'{hint}", name)
 
 
 def _stored(step: Step, program: Program, resources: Mapping[str, Resource], texts: Texts) -> Iterator[Problem]:
-    """Order rests on nobody writing what a step reads; and beyond a buffer's end a shader finds nothing."""
+    """Find writes to inputs, which would invalidate the order of steps, and blocks larger than their buffer."""
     writes = {write.name: write for write in step.writes}
     uses: dict[str, Read | Write] = {**dict(named_reads(step)), **writes}
     stored = {name: use.use for name, use in uses.items() if use.use in ("image", "buffer")}
@@ -162,14 +162,14 @@ def _stored(step: Step, program: Program, resources: Mapping[str, Resource], tex
                 problems.append(step.problem("RG438", f"block '{own}' {short.pop(found.name)}"))
             if found.name in only_read and "readonly" not in found.qualifiers:
                 right = f"uniform readonly {found.type} {own}" if found.type else f"readonly buffer {own}"
-                text = f"'{own}' is only read, so it is declared `{right}`; what a step writes stands in `out`"
+                text = f"'{own}' is only read, so declare it as `{right}`; a step writes only what is in `out`"
                 problems.append(step.problem("RG457", f"{stored[found.name]} {text}"))
             place, line = stage.source.place(found.at)
             yield from [problem.relocate(place, line) if place else problem for problem in problems]
 
 
 def check_attributes(step: Step, program: Program, given: Mapping[str, str], texts: Texts) -> None:
-    """A vertex attribute that no buffer holds would be (0, 0, 0, 1) at every vertex, or what another draw left.
+    """Find vertex attributes without a buffer, which would be (0, 0, 0, 1) or another draw's values at every vertex.
 
     `given` are attributes with their moderngl formats, `3f` or `2i`.
     """
@@ -185,14 +185,14 @@ def _attributes(step: Step, program: Program, given: Mapping[str, str], texts: T
         if name not in given:
             text += f", {lacks}{suggestion(name, given)}"
         elif (shape == "f") != ("f" in given[name]) and shape != "f":
-            text += f" as whole numbers, but it holds floats ({given[name]})"
+            text += f" as integers, but it holds floats ({given[name]})"
         else:
             continue
         yield _placed(step.problem("RG428", text), name, texts)
 
 
 def attributes_of(program: Program) -> dict[str, str]:
-    """A program's vertex attributes with `f`, `i` or `d` for the kind of number."""
+    """Return a program's vertex attributes with `f`, `i` or `d` for the numeric type."""
     members = program.object
     return {
         name: members[name].shape
@@ -202,8 +202,8 @@ def attributes_of(program: Program) -> dict[str, str]:
 
 
 def _placed(problem: Problem, name: str, texts: Texts) -> Problem:
-    """The problem at the line where the shader declares a name, if it is found."""
-    from rendergraph.program.messages import declared_at  # where something is wrong alone
+    """Move a problem to the line where the shader declares a name, if it is found."""
+    from rendergraph.program.messages import declared_at  # only for mistakes
 
     for mentions, text in product((False, True), texts().values()):
         found = declared_at(text.source, [name], mentions=mentions)
@@ -215,7 +215,7 @@ def _placed(problem: Problem, name: str, texts: Texts) -> Problem:
 def layout_for(layout: str, program: Program) -> tuple[str, list[str]]:
     """Return a buffer's layout for a program as moderngl's format, and the names that the program uses.
 
-    What it does not use becomes padding.
+    Unused attributes become padding.
     """
     parts, used = _layout_parts(layout), attributes_of(program)
     formats = []
@@ -230,7 +230,7 @@ def attribute_formats(layout: str) -> dict[str, str]:
 
 
 def _layout_parts(layout: str) -> list[tuple[re.Match[str], str]]:
-    """The formats of a layout such as `3f 4x 2f in_position in_uv`, each with its name, empty for padding."""
+    """Return the formats of a layout such as `3f 4x 2f in_position in_uv`, each with its name, empty for padding."""
     words = layout.split()
     formats = [match for word in words if (match := re.match(_FORMAT, word))]
     names = iter(words[len(formats) :])

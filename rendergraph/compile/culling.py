@@ -1,8 +1,8 @@
-"""What a view sees of a scene's objects: those outside of it are not drawn, and the others near to far.
+"""Frustum culling, and sorting of visible objects by depth.
 
-A box lies outside where it is beyond one side of the view altogether. A rasteriser finds nothing there, so no bit of a
-picture depends on leaving it out: boxes are as large as the GPU's rounding may make them. That is worked out once for
-each view that has moved, in NumPy over all objects; a list of draw commands is written where it has become another.
+A box is culled if it lies entirely outside one plane of the frustum. Boxes are enlarged by the GPU's possible rounding,
+so culling never changes a bit of a picture. Whenever a view has moved, NumPy culls all objects at once; a list of draw
+commands is uploaded only if it has changed.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ COMMAND = np.dtype(
 """DrawElementsIndirectCommand."""
 
 _ROUNDING = 8 * 2.0**-23
-"""Of clip coordinates and of what is compared with them, relative to the sizes of their terms."""
+"""Rounding error of clip coordinates and of what they are compared with, relative to the sizes of their terms."""
 
 
 def commands(packed: PackedScene, meshes: Records) -> Records:
-    """`COMMAND` records that draw each object of a scene; `meshes` says where its indices lie."""
+    """Return `COMMAND` records that draw each object of a scene; `meshes` locates its indices."""
     found = np.zeros(len(packed.object_mesh), COMMAND)
     of = meshes[packed.object_mesh]
     for name in ("count", "first_index", "base_vertex"):
@@ -47,10 +47,10 @@ def commands(packed: PackedScene, meshes: Records) -> Records:
 
 
 def visible_objects(packed: PackedScene, view: ViewMatrices, *, clamped: bool = False) -> Bools:
-    """Which objects a view may see, bool (n,): false where an object's box lies beyond one side of it.
+    """Return which objects a view may see, bool (n,): false if an object's box lies outside one plane of the frustum.
 
     Args:
-        clamped: depth is clamped, so that what lies before the near plane or behind the far one is drawn as well.
+        clamped: depth is clamped, so that objects before the near plane or behind the far plane are drawn as well.
     """
     x, y, z, w = reversed_projection(view) @ view.view
     sides = np.stack([w + x, w - x, w + y, w - y, *(() if clamped else (z, w - z))])
@@ -62,12 +62,12 @@ def visible_objects(packed: PackedScene, view: ViewMatrices, *, clamped: bool = 
 
 
 class DrawList(Struct, eq=False):
-    """Draw commands of some objects, of which those that are seen stand at the front of a buffer.
+    """Draw commands of some objects; those of visible objects are at the front of a buffer.
 
     Attributes:
         all: commands of every object of the scene.
-        objects: what the list draws when all of it is seen, in the scene's order.
-        changed: called with the objects that are drawn, in order, when these are others.
+        objects: the objects that the list draws if all are visible, in the scene's order.
+        changed: called with the drawn objects, in order, whenever they change.
     """
 
     buffer: moderngl.Buffer
@@ -78,7 +78,7 @@ class DrawList(Struct, eq=False):
     drawn: Objects = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def update(self, visible: Bools | None, depths: Doubles) -> None:
-        """Draw what is visible, of equally far objects the scene's first one first."""
+        """Write the commands of visible objects; objects with equal depth keep the scene's order."""
         objects = self.objects if visible is None else self.objects[visible[self.objects]]
         if self.order != "scene":
             far = depths[objects]
@@ -93,10 +93,10 @@ class DrawList(Struct, eq=False):
 
 
 class SceneView(Struct, eq=False):
-    """The lists that are drawn with one view, or with all views of a table where a shader chooses the layer.
+    """The lists that are drawn with one view, or with all views of a table if a shader chooses the layer.
 
     Attributes:
-        table, index: the view; None for all of the table.
+        table, index: the view; None for all views of the table.
     """
 
     table: str
@@ -106,7 +106,7 @@ class SceneView(Struct, eq=False):
     lists: list[DrawList] = field(default_factory=list)
 
     def cull_and_sort(self, packed: PackedScene, views: ViewBuffers, *, cull: bool) -> None:
-        """Bring all lists to what is seen now, in the order of its distance along the view's axis."""
+        """Update all lists to the visible objects, sorted by depth along the view's axis."""
         table = views.current[self.table]
         chosen = table if self.index is None else (table[self.index],)
         visible: Bools | None = None

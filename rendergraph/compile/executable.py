@@ -1,7 +1,7 @@
-"""What compiling yields: draws with their uniforms and state, assembled into a flat list of calls.
+"""The result of compiling: draws with their uniforms and state, assembled into a flat list of calls.
 
-Uniforms that all users of a program agree on are written once when the pipeline becomes active; only what differs is
-written by each draw. A changed parameter assembles the lists anew: no GL object is made, no shader compiled.
+Uniforms with the same value in all draws of a program are written once when the pipeline becomes active; each draw
+writes only the others. A changed parameter only reassembles the lists: no GL object is created, no shader compiled.
 """
 
 from __future__ import annotations
@@ -40,22 +40,22 @@ if TYPE_CHECKING:
 
 
 _MOST_PARTS = 64
-"""Lists of some of the steps that are remembered."""
+"""Maximum number of cached lists of some of the steps."""
 
 
 _OF_INSTANCES = {
     "scene_instance_block": "instances",
     **dict.fromkeys(("scene_previous_block", "scene_previous_position_block"), "instances before"),
 }
-"""Blocks of the scene's data that change with other sources."""
+"""Blocks of the scene's data that change together with other sources."""
 
 
 class Draw(Struct, eq=False):
-    """One draw call or dispatch with what must be set before it.
+    """One draw call or dispatch with the state to set before it.
 
     Attributes:
-        binds: texture and buffer binds of its own; textures only where the driver's units ran out.
-        textures: sampled name to its texture in this parity and its sampler, where that is a plain 2D texture.
+        binds: its own texture and buffer bindings; textures only if the driver's units ran out.
+        textures: sampled name to texture in this parity and sampler, for plain 2D textures.
     """
 
     program: Program
@@ -68,7 +68,7 @@ class Draw(Struct, eq=False):
 
 
 class SortedDraws(Struct, eq=False):
-    """Draws whose order is the eye's: each part is compiled once, and runs of neighbours are found anew as it moves.
+    """Depth-sorted draws: each part is compiled once, and runs of neighbours are found again whenever the view moves.
 
     Attributes:
         runs: part number, first command and number of commands, far to near.
@@ -87,7 +87,7 @@ class SortedDraws(Struct, eq=False):
 
 
 class _Cell(Struct, eq=False):
-    """A uniform that `update` sets: what is written before a draw, where others have a call for good."""
+    """A uniform that `update` sets: a call before a draw whose value can change."""
 
     step: StepKey
     draw: Draw
@@ -105,10 +105,10 @@ class CompiledStep(Struct, eq=False):
 
     Attributes:
         before: framebuffer, clears.
-        sorted: draws whose order is the eye's, instead of `draws`.
+        sorted: depth-sorted draws, instead of `draws`.
         after: barriers, poison.
-        watched: around the draws: calls that count, or leave them out; first and last.
-        name: the step's, as plans have it.
+        watched: calls before and after the draws: occlusion queries and conditional rendering.
+        name: the step's name, as in plans.
     """
 
     step: Step
@@ -124,16 +124,16 @@ class CompiledStep(Struct, eq=False):
         return self.draws + (self.sorted.parts if self.sorted is not None else [])
 
     def values(self, step: Step) -> dict[str, Any]:
-        """The uniforms of a step like this one that any of its programs looks at."""
+        """Return the uniforms of an equal step that any of its programs uses."""
         seen = {name for draw in self.all_draws for name in draw.program.uniforms}
         seen |= {"values"} if self.step.kind == "upload" else set()
         return {name: value for name, value in step_uniforms(step).items() if name in seen}
 
 
 class FrameStep(Struct, frozen=True, eq=False):
-    """A step as a frame runs it: all its calls, flat, and what measures it.
+    """A step as executed in a frame: a flat list of its calls, and its timer.
 
-    What is set before a draw depends on the steps before it, so the calls of another list may differ.
+    State changes depend on the preceding steps, so the calls may differ between lists.
     """
 
     step: Step
@@ -145,24 +145,24 @@ class Executable(Struct, eq=False, dict=True):
     """A compiled pipeline of one size.
 
     Attributes:
-        binds: the calls that bind textures, samplers and blocks, a list a parity.
-        lists: what the next frame runs, a list a parity; filled by `assemble`.
+        binds: the calls that bind textures, samplers and blocks, one list per parity.
+        lists: the steps of the next frame, one list per parity; filled by `assemble`.
         due: kept steps that the next frame runs.
-        scene_views: which objects are drawn, and in what order; asked when a view or an object has moved.
-        contents: what `update` has written into buffers.
+        scene_views: the drawn objects and their order; updated when a view or an object has moved.
+        contents: bytes that `update` has written into buffers.
         stale: the buffers among them that this drawing has not written yet.
         touched: the sources that have changed since the last frame, except the scene's.
-        changes_seen: the scene's counters of changes, as of the last frame.
-        recorded_steps: those in the plan, and those that are left out.
+        changes_seen: the scene's counters of changes at the last frame.
+        recorded_steps: all recorded steps, including those that are not in the plan.
         buffers: draw commands.
-        uploads: values that the CPU gives textures and buffers, by the steps that upload them.
+        uploads: values that the CPU computes for textures and buffers, by upload step.
         vertex_arrays: frees the vertex arrays over the plan's own buffers.
-        drawn: frames since history began; 0 also where that is gone.
-        parity: of the two textures of each history, the one that the last frame wrote.
-        fresh: `statics` have to be written and everything bound before the next frame.
-        uses_previous: a program looks at where things were in the frame before.
-        shares_kept: what they make may be taken over from other pipelines, and by those.
-        means: the `LightMeans` of the moments of a frame, once a frame has several.
+        drawn: frames since the history began; 0 if the history is lost.
+        parity: which of the two textures of each history the last frame wrote.
+        fresh: `statics` must be written and everything bound before the next frame.
+        uses_previous: a program reads positions or views of the previous frame.
+        shares_kept: kept values may be exchanged with other pipelines.
+        means: the `LightMeans` of a frame's moments, once a frame has several.
     """
 
     device: Device
@@ -203,14 +203,14 @@ class Executable(Struct, eq=False, dict=True):
 
     @cached_property
     def kept(self) -> dict[StepKey, Step]:
-        """The steps that make what outlives the frame."""
+        """The steps that write resources kept from frame to frame."""
         resources = self.plan.resources
         steps = self.plan.schedule.steps
         return {s.key: s for s in steps if any(resources[write.resource].role == "kept" for write in s.writes)}
 
     @cached_property
     def uniforms(self) -> Mapping[str, set[str]]:
-        """The names of the uniforms of each node, of steps that are left out as well."""
+        """The names of each node's uniforms, including those of steps that are left out."""
         found: dict[str, set[str]] = {}
         for step in self.recorded_steps:
             for node, uniforms in ((step.node, step.uniforms), *((one.node, one.uniforms) for one in step.functions)):
@@ -222,32 +222,32 @@ class Executable(Struct, eq=False, dict=True):
         return {draw.program for steps in self.steps for step in steps for draw in step.all_draws}
 
     def invalidate(self) -> None:
-        """Let the next frame make everything, what is kept included: nothing has, or what did failed."""
+        """Make the next frame run every step, kept ones included: no frame has run yet, or the last one failed."""
         self.due = set(self.kept)
         self.reuse.forget()
         self.assemble()
 
     def cull_and_sort(self, *, moved: bool, cull: bool) -> None:
-        """Let geometry steps draw what their views see now; `moved` says that objects have."""
+        """Cull and sort the objects of geometry steps; `moved` tells whether objects have moved."""
         for each in self.scene_views:
             if moved or each.table in self.views.changed:
                 each.cull_and_sort(self.scene.packed, self.views, cull=cull)
 
     def end_frame(self) -> None:
-        """A frame has run: go on without the kept steps that were due."""
+        """Mark the kept steps that were due as done."""
         self._running, self.lists = False, self._steady
         if self.due:
             self.due, self.has_new_kept = set(), True
 
     def mark_restored(self, resources: Collection[str]) -> None:
-        """These kept values have been put where they belong: the steps that make nothing else have not to run."""
+        """Skip the due kept steps that write only these resources, which have been restored."""
         missing = {key for key in self.due if any(w.resource not in resources for w in self.kept[key].writes)}
         self.due = self._with_dependents(missing)
-        self.reuse.forget()  # what reads them has to run again
+        self.reuse.forget()  # their readers must run again
         self.assemble()
 
     def reset_updates(self) -> None:
-        """A drawing begins: what `update` set in the one before does not hold."""
+        """Discard everything that `update` set in the previous drawing."""
         for region in self.memory.regions.values():
             region.set()
         for cell in chain.from_iterable(self._cells.values()):
@@ -255,7 +255,7 @@ class Executable(Struct, eq=False, dict=True):
         self.stale = set(self.contents)
 
     def cells(self, node: str, name: str) -> list[_Cell]:
-        """The places of a uniform of a node in programs that run in every frame, for `write_uniform`."""
+        """Return the cells of a node's uniform in programs that run in every frame, for `write_uniform`."""
         if (node, name) not in self._cells:
             found = [
                 _Cell(compiled.step.key, draw, before + name)
@@ -279,13 +279,13 @@ class Executable(Struct, eq=False, dict=True):
         return None
 
     def write_uniform(self, cell: _Cell, value: UniformValue) -> None:
-        """Set a uniform in one of its places."""
+        """Set a uniform in one of its cells."""
         if repr(cell.value) != repr(value):
             cell.value, cell.call = value, cell.draw.program.writer(cell.name, value)
             self.touched.add(("step", cell.step))
 
     def write_buffer(self, id: str, data: bytes) -> None:
-        """Write a buffer for `update`; after what this drawing has written all is 0."""
+        """Write the beginning of a buffer for `update`; the first write of a drawing sets the rest to 0."""
         buffer, before = self.memory.buffer(id), self.contents.get(id, b"")
         if id in self.stale:
             self.stale.discard(id)
@@ -298,14 +298,14 @@ class Executable(Struct, eq=False, dict=True):
             self.touched.add(("buffer", id))
 
     def computed(self, steps: Collection[StepKey]) -> None:
-        """Let upload steps whose values have been computed anew run, and the kept steps that start from them."""
+        """Schedule upload steps whose values have been recomputed, and the kept steps that depend on them."""
         self.touched |= {("step", key) for key in steps}
         if kept := self.kept.keys() & steps:
             self.due = self._with_dependents(self.due | kept)
             self.assemble()
 
     def end_updates(self) -> None:
-        """All nodes have been updated: note the regions and buffers that are others than in the frame before."""
+        """Record which regions and buffers have changed since the previous frame; call it after all updates."""
         for id in list(self.stale):
             self.write_buffer(id, b"")
         for (node, number), region in self.memory.regions.items():
@@ -315,20 +315,20 @@ class Executable(Struct, eq=False, dict=True):
                 self.touched.add(("region", node, number))
 
     def mark_stale(self) -> None:
-        """Another executable has drawn meanwhile: shared programs hold its uniforms, shared textures its texels."""
+        """Discard all state: another executable has written the uniforms of shared programs and shared textures."""
         self.fresh, self.drawn = True, 0
         self.reuse.forget()
 
     def abort(self) -> None:
-        """A step was broken off in its middle: leave nothing of it to what is drawn after."""
+        """End active queries after an interrupted step, so that later draws are not affected."""
         for query in self.occlusion_queries:
             query.abort()
         self.fresh = True
 
     def steps_for_frame(self, *, reuse: bool, repeats: bool = False) -> list[FrameStep]:
-        """What a frame runs: all steps, or with `reuse` those whose values are gone or out of date.
+        """Return the steps of a frame: all, or with `reuse` those whose results are lost or out of date.
 
-        `repeats` says that it is drawn with the same history as the frame before, and in its place.
+        A frame that `repeats` replaces the previous one: it reads the same history.
         """
         changes = self.scene.changes
         if changes != self.changes_seen:
@@ -338,7 +338,7 @@ class Executable(Struct, eq=False, dict=True):
             if again := {key for key, sources in self._kept_sources.items() if not sources.isdisjoint(changed)}:
                 self.due = self._with_dependents(self.due | again)
                 self.assemble()
-        if not reuse or self.due or self._running:  # or the last frame was broken off
+        if not reuse or self.due or self._running:  # `_running`: the last frame was interrupted
             self.reuse.forget()
         self._running = True
         positions = self.reuse.choose(frozenset(self.touched), repeats)
@@ -353,9 +353,9 @@ class Executable(Struct, eq=False, dict=True):
         return self._parts[key]
 
     def steps_with_stops(self, stops: Mapping[int, Call]) -> list[FrameStep]:
-        """All steps of a frame, with calls that leave any state before those at some positions, or behind the last one.
+        """Return all steps of a frame, with state-changing calls inserted before some positions or after the last step.
 
-        Call it behind `steps_for_frame`, which says which kept steps are due.
+        Call it after `steps_for_frame`, which decides which kept steps are due.
         """
         keys = [compiled.step.key for compiled in self.steps[0]]
         positions = tuple(at for at, key in enumerate(keys) if key not in self.kept or key in self.due)
@@ -375,14 +375,14 @@ class Executable(Struct, eq=False, dict=True):
 
     @cached_property
     def _kept_sources(self) -> dict[StepKey, frozenset[Source]]:
-        """What the kept steps that read the scene's data look at; others look at nothing that moves."""
+        """The sources of kept steps that read the scene's data; other kept steps have none that change."""
         if not any(step.reads_scene for step in self.kept.values()):
             return {}
         sources = zip(self.steps[0], self._step_sources(), strict=True)
         return {one.step.key: found for one, found in sources if one.step.key in self.kept and one.step.reads_scene}
 
     def _step_sources(self) -> list[frozenset[Source]]:
-        """For each step, what it looks at beside what other steps have made."""
+        """Return the sources of each step, apart from the results of other steps."""
         resources, found = self.plan.resources, []
         for compiled in self.steps[0]:
             step = compiled.step
@@ -418,9 +418,9 @@ class Executable(Struct, eq=False, dict=True):
 
     @cached_property
     def moves_with_time(self) -> bool:
-        """Whether some program moves something by the time.
+        """Whether a program moves anything over time.
 
-        Full-screen steps that adapt to light look at `delta_time`, and move nothing.
+        In full-screen steps, `delta_time` does not count: they use it for adaptation, not for motion.
         """
         for step in self.steps[0]:
             names = {"time"} if step.step.kind == "fullscreen" else {"time", "delta_time"}
@@ -432,11 +432,11 @@ class Executable(Struct, eq=False, dict=True):
 
     @property
     def was_updated(self) -> bool:
-        """Whether nodes have given buffers or uniforms other values since the frame before."""
+        """Whether nodes have changed buffers or uniforms since the previous frame."""
         return any(isinstance(source, tuple) and source[0] in ("buffer", "step") for source in self.touched)
 
     def assemble(self) -> None:
-        """Make the flat lists of calls from the steps' draws, leaving out what changes nothing."""
+        """Build the flat lists of calls from the steps' draws, without redundant state changes."""
         shared = _differing(draw for step in self.steps[0] for draw in step.all_draws)
         cells = {(id(cell.draw), cell.name): cell for found in self._cells.values() for cell in found}
         shared |= {(cell.draw.program.glo, cell.name) for cell in cells.values()}
@@ -466,7 +466,7 @@ class Executable(Struct, eq=False, dict=True):
                 calls: list[Call] = [*compiled.before, *compiled.watched[0]]
                 last = found[-1].calls[-1:] if found else ()
                 if calls and last and calls[0] is last[0]:
-                    del calls[0]  # one barrier between two steps that store
+                    del calls[0]  # one barrier is enough between two steps that store
                 for draw in compiled.draws:
                     calls += draw.binds
                     if draw.state is not None:
@@ -493,7 +493,7 @@ class Executable(Struct, eq=False, dict=True):
             positions = [at for at, key in enumerate(keys) if key not in self.kept or key in due]
             return [listed(parity, positions, wait=wait) for parity in range(len(self.steps))]
 
-        # Drivers draw later than they are told to. To name a step that hangs, a first frame waits for each one.
+        # Drivers run commands asynchronously. The first frame waits for each step, so that a hanging one can be named.
         wait = activity.draw_seconds() > 0
         self._steady = all_but_kept(())
         self.lists = all_but_kept(self.due, wait=wait) if self.due or wait else self._steady
@@ -501,7 +501,7 @@ class Executable(Struct, eq=False, dict=True):
         self.fresh = True
 
     def changed(self, values: Mapping[StepKey, Step]) -> set[StepKey]:
-        """The steps whose parameter values are others in these, which must be the same but for their uniforms."""
+        """Return the steps whose parameters differ in `values`, whose steps may differ only in uniforms."""
         return {c.step.key for c in self.steps[0] if repr(c.values(c.step)) != repr(c.values(values[c.step.key]))}
 
     def set_uniforms(self, values: Mapping[StepKey, Step]) -> None:
@@ -518,10 +518,10 @@ class Executable(Struct, eq=False, dict=True):
         self.assemble()
 
     def _with_dependents(self, due: set[StepKey]) -> set[StepKey]:
-        """The steps that have to run again where these do.
+        """Return the steps that must run again if these do.
 
-        Those are all that make one of their textures, as what each of them found there is gone, all that read one, and
-        whoever makes what they read in a state before the last. The scene's environment is read and never made.
+        These are all writers of their textures, because earlier versions are overwritten, all readers of them, and all
+        writers of textures that they read in an earlier version. The scene's environment is never written.
         """
         final: dict[str, int] = {}
         for step in self.kept.values():
@@ -537,7 +537,7 @@ class Executable(Struct, eq=False, dict=True):
             due = due | more
 
     def release(self) -> None:
-        """Free what it owns; programs and scenes are the session's."""
+        """Free what it owns; programs and scenes belong to the session."""
         self.vertex_arrays()
         owned: list[Any] = [self.memory, self.views, *self.buffers, *self.timers, *self.occlusion_queries]
         owned += [self.means] if self.means is not None else []
@@ -548,13 +548,13 @@ class Executable(Struct, eq=False, dict=True):
 
 
 def named(step: Step) -> list[tuple[str, Read]]:
-    """What a step and the functions it calls read, each with what stands before its name in the text."""
+    """Return the reads of a step and of the functions that it calls, each with its prefix in the program text."""
     found = [("", read) for read in step.reads]
     return found + [(prefix(function.node), read) for function in step.functions for read in function.reads]
 
 
 def step_uniforms(step: Step) -> dict[str, Any]:
-    """A step's uniforms and, under their prefixed names, those of the functions it calls."""
+    """Return a step's uniforms and, under prefixed names, those of the functions that it calls."""
     values: dict[str, Any] = dict(step.uniforms)
     for function in step.functions:
         values |= {prefix(function.node) + name: value for name, value in function.uniforms}
@@ -564,14 +564,14 @@ def step_uniforms(step: Step) -> dict[str, Any]:
 
 
 def _uniforms_of(step: Step, node: str) -> Iterator[tuple[str, Container[str]]]:
-    """What stands before the names of a node's uniforms in a step's program, and those names."""
+    """Yield the prefix of a node's uniforms in a step's program, and their names."""
     if step.node == node:
         yield "", dict(step.uniforms)
     yield from ((prefix(node), dict(each.uniforms)) for each in step.functions if each.node == node)
 
 
 def _differing(draws: Iterable[Draw]) -> set[tuple[int, str]]:
-    """Uniforms that two draws of one program want to be different; told apart by text, as 0.0 equals -0.0."""
+    """Return the uniforms that differ between draws of one program; compared as text, because 0.0 equals -0.0."""
     first: dict[tuple[int, str], str] = {}
     differ: set[tuple[int, str]] = set()
     for draw in draws:

@@ -22,21 +22,21 @@ from rendergraph.textures import TextureDesc
 Maps: TypeAlias = Mapping[str, npt.NDArray[np.uint8]]
 _MOST_KEPT = 64 << 20
 _POINTS = 2
-"""Points along each side of a texel whose mean it is."""
+"""Sample points along each side of a texel, which are averaged."""
 _FORMATS = ("rgba8", "rgba32f", "rgba8", "rgba8")
 _MAPS = {"color": 0, "normal": 2, "surface": 3}
 _READ_WRITE, _ALL_BARRIERS = 0x88BA, 0xFFFFFFFF
 
 
 class TextureGenerator(Struct, eq=False):
-    """Evaluates generated textures, and keeps the texels of the latest ones for the scenes that follow."""
+    """Evaluates generated textures, and caches the texels of the latest ones for later scenes."""
 
     programs: ProgramCache
     _kept: dict[Hashable, Maps] = field(default_factory=dict)
 
     def texels(self, source: ImageSource) -> npt.NDArray[np.uint8]:
         """Return one map of a generated texture, (height, width, 4), top row first."""
-        assert source.generated is not None  # others are decoded
+        assert source.generated is not None  # other images are decoded
         text = _text(source.generated.shader)
         key = text.text, source.generated.values
         if key not in self._kept:
@@ -73,7 +73,7 @@ def _bytes(maps: Maps) -> int:
 
 
 def _text(shader: Path) -> StageText:
-    """The program text of a kind."""
+    """Return the program text of a kind of texture."""
     include = folder("rendergraph.shaders") / "include"
     body = Includes(include).expand(include / "texture.comp", plugged={"TEXTURE": shader})
     return StageText("compute", generated([VERSION]) + body)

@@ -1,7 +1,7 @@
-"""Geometry steps to indirect multi-draws, which cost the same for ten objects and ten thousand.
+"""Compile geometry steps into indirect multi-draws, which cost the same for ten objects and ten thousand.
 
-A multi-draw is what can be drawn without changing anything: same macros, textures, culling and winding. How finely
-objects must be told apart depends on what the step's shader looks at: a depth pass puts everything opaque into one.
+A multi-draw has objects that need no state change: same macros, textures, culling and winding. How many multi-draws
+are needed depends on what the step's shader uses: a depth pass draws all opaque objects in one.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from rendergraph.steps import Step
 
 
 class MultiDrawKey(Struct, frozen=True):
-    """What makes two objects drawable together."""
+    """Objects with equal keys can be drawn together."""
 
     defines: tuple[tuple[str, str], ...]
     textures: tuple[tuple[str, Texture], ...]
@@ -64,7 +64,7 @@ class CommandDraw(MultiDraw, eq=False):
 
     Attributes:
         buffer: the commands.
-        runs: the first object and the number of those next to each other that are drawn together.
+        runs: first object and count of each run of consecutive objects that are drawn together.
     """
 
     buffer: moderngl.Buffer
@@ -83,7 +83,7 @@ class CommandDraw(MultiDraw, eq=False):
 
 
 class GeometryCompiler(Struct, eq=False):
-    """Multi-draws of a scene's objects, and the views that decide what they draw."""
+    """Multi-draws of a scene's objects, and the views that decide which objects they draw."""
 
     scene: GpuScene
     views: dict[tuple[Any, ...], SceneView] = field(default_factory=dict)
@@ -108,7 +108,7 @@ class GeometryCompiler(Struct, eq=False):
         return [make(self._multi_draw(step, key, members)) for key, members in runs]
 
     def by_commands(self, step: Step, buffer: moderngl.Buffer, make: Callable[[MultiDraw], Draw]) -> list[Draw]:
-        """Draws by the commands in a buffer, which the step itself decides nothing about."""
+        """Return draws that take their commands from a buffer, without culling by the step."""
         groups: dict[MultiDrawKey, list[int]] = {}
         for index in select(self.scene.scene, step):
             groups.setdefault(self._key(step, index), []).append(index)
@@ -133,7 +133,7 @@ class GeometryCompiler(Struct, eq=False):
         return self._multi_draws[key]
 
     def _sorted(self, step: Step, objects: list[int], make: Callable[[MultiDraw], Draw]) -> SortedDraws:
-        """A part for each kind of object over one list of commands, which is sorted far to near as the view moves."""
+        """Return one part per kind of object over one list of commands, sorted far to near whenever the view moves."""
         keys = [self._key(step, index) for index in objects]
         parts = {key: number for number, key in enumerate(dict.fromkeys(keys))}
         part_of = np.zeros(max(objects) + 1, np.int64)
@@ -164,7 +164,7 @@ class GeometryCompiler(Struct, eq=False):
         return MultiDraw(dict(key.defines), found, key.cull, key.clockwise, drawn, mode)
 
     def _list(self, step: Step, members: list[int]) -> DrawList:
-        """Commands of objects, filled whenever the step's view or an object has moved."""
+        """Return the commands of objects, updated whenever the step's view or an object has moved."""
         buffer = self.scene.device.ctx.buffer(reserve=len(members) * COMMAND.itemsize)
         self.buffers.append(buffer)
         commands = self.scene.indices(step.topology).commands

@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from rendergraph.compile.posing import Posing
 
 DecodeLight = Callable[[ImageSource | MadeImage], npt.NDArray[Any]]
-"""The picture around a scene, likewise."""
+"""Decodes the environment map of a scene."""
 
-_ANISOTROPY = 8  # texels along the longer side of what a pixel sees of a texture
+_ANISOTROPY = 8  # maximum anisotropy of material textures
 _STREAMS = {
     "in_position": ("positions", "3f"),
     "in_normal": ("normals", "3f"),
@@ -50,10 +50,10 @@ _STREAMS = {
 """Vertex attributes with the arrays of `PackedScene` and moderngl's formats."""
 _POSED = ("in_position", "in_normal", "in_tangent")
 _ABSENT = {"in_tangent": (0.0, 0.0, 0.0, 0.0), "in_uv0": (0.0, 0.0), "in_uv1": (0.0, 0.0), "in_color": (1.0,) * 4}
-"""What an attribute holds that no mesh of the scene has; `pack` fills the same in for a mesh that lacks it."""
+"""Values of attributes that no mesh of the scene has; `pack` uses the same for a mesh that lacks one."""
 _INSTANCE_FORMAT = (("in_object0", "4f"), ("in_object1", "4f"), ("in_object2", "4f"), ("in_ids", "2i"))
 _PREVIOUS_FORMAT = (("in_previous0", "4f"), ("in_previous1", "4f"), ("in_previous2", "4f"), ("", "2i"))
-"""The same rows in the frame before."""
+"""The same rows in the previous frame."""
 _PREVIOUS_POSITION = "in_previous_position"
 PREVIOUS_ATTRIBUTES = (*(name for name, _ in _PREVIOUS_FORMAT if name), _PREVIOUS_POSITION)
 SCENE_ATTRIBUTES = {
@@ -62,10 +62,10 @@ SCENE_ATTRIBUTES = {
     **{name: layout for name, layout in _PREVIOUS_FORMAT if name},
     _PREVIOUS_POSITION: "3f",
 }
-"""What a vertex shader that draws the scene may read, with moderngl's formats."""
+"""Attributes that a vertex shader may read when it draws the scene, with moderngl's formats."""
 _SECTIONS = {"objects": "instances", "materials": "material_block", "lights": "light_block"}
-"""Sections of scene files with what changes where values of plugins' keys change."""
-_MOST_RUNS = 32  # of neighbouring records that are uploaded one by one; what lies between them goes along beyond
+"""Sections of scene files, with the source that changes if values of plugins' keys change."""
+_MOST_RUNS = 32  # of consecutive records uploaded separately; if there are more, everything between is uploaded too
 _PADDING = {"4f": "16x", "2i": "8x"}
 
 
@@ -76,10 +76,10 @@ class MeshIndices(Struct, frozen=True, eq=False):
 
 
 class GpuScene(Struct, eq=False, dict=True):
-    """Buffers, material textures and the macros a scene gives to shaders.
+    """The buffers, material textures and macros of a scene.
 
     Attributes:
-        changes: how often each block, the `instances`, and those of the frame before have been uploaded anew, or the
+        changes: how often each block, the `instances` and those of the previous frame have been uploaded again, or the
             `camera` has changed.
     """
 
@@ -101,7 +101,7 @@ class GpuScene(Struct, eq=False, dict=True):
     _tree: tuple[MeshTrees, moderngl.Buffer] | None = None
     _tree_texture: int = 0
     _posing: Posing | None = None
-    _stale_instances: set[int] = set()  # objects that have moved since the frame before was kept
+    _stale_instances: set[int] = set()  # objects that have moved since the previous frame was saved
 
     def __post_init__(self) -> None:
         ctx, packed = self.device.ctx, self.packed
@@ -117,7 +117,7 @@ class GpuScene(Struct, eq=False, dict=True):
             if records.size:
                 self._blocks[block] = (ctx.buffer(records.tobytes()), block in stored)
         if packed.vertex_orders:
-            from rendergraph.compile.posing import Posing  # for animated meshes alone
+            from rendergraph.compile.posing import Posing  # only for animated meshes
 
             streams = {_STREAMS[name][0]: buffer for name, (buffer, _) in self._streams.items() if name in _POSED}
             self._posing = Posing.make(self.device, self.scene, packed, streams)
@@ -136,7 +136,7 @@ class GpuScene(Struct, eq=False, dict=True):
         return {name for name, (_, storage) in self._blocks.items() if storage}
 
     def bind(self) -> None:
-        """Bind lights and materials to their points; once a frame."""
+        """Bind lights and materials to their binding points; once per frame."""
         for name, (buffer, storage) in self._blocks.items():
             if storage:
                 buffer.bind_to_storage_buffer(FIXED_BLOCKS[name])
@@ -144,10 +144,10 @@ class GpuScene(Struct, eq=False, dict=True):
                 self.device.bind_block(buffer, FIXED_BLOCKS[name])
 
     def update(self, scene: Scene) -> bool:
-        """Take over an animated scene's lights, transforms and poses; the meshes stay.
+        """Update to an animated scene's lights, transforms and poses; the meshes stay.
 
         Returns:
-            Whether vertices have been posed, with buffers bound to points that steps use.
+            Whether vertices have been posed, which binds buffers to binding points that steps use.
         """
         packed, has_posed = pack.update(self.packed, self.scene, scene), False
         for block, now, before in (
@@ -189,7 +189,7 @@ class GpuScene(Struct, eq=False, dict=True):
         return has_posed
 
     def advance(self) -> None:
-        """From now on where the objects are is where they were in the frame before; asked of what looks back."""
+        """Make the current positions of objects those of the previous frame, for programs that read these."""
         if self._before is not None and self._stale_instances:
             write_records(self._before, self.packed.instances, np.array(sorted(self._stale_instances), np.int64))
             self.changes["instances before"] += 1
@@ -199,7 +199,7 @@ class GpuScene(Struct, eq=False, dict=True):
 
     @property
     def data(self) -> SceneBuffers:
-        """The scene's data, uploaded when somebody first asks."""
+        """The scene's data, uploaded on first use."""
         if self._data is None:
             used = used_textures(self.scene)
             self.load_images(list(used.values()))
@@ -212,14 +212,14 @@ class GpuScene(Struct, eq=False, dict=True):
         return self._data
 
     def texels(self, name: str) -> int:
-        """The GL texture of a buffer that shaders fetch as texels."""
+        """Return the GL texture of a buffer that shaders fetch as texels."""
         if name != TREE:
             return self.data.texels[name]
         self.tree()
         return self._tree_texture
 
     def tree(self) -> moderngl.Buffer:
-        """The trees for `trace.glsl`, built when a program first looks."""
+        """The trees for `trace.glsl`, built on first use."""
         if self._tree is None:
             trees = self._mesh_trees()
             rows = object_rows(self.packed, self.data.instances["flags"], trees)
@@ -240,12 +240,12 @@ class GpuScene(Struct, eq=False, dict=True):
         return {**self.defines, **data_macros(self.scene, self.packed, self.data.arrays)}
 
     def drop_unused_images(self) -> None:
-        """Free the images that only the arrays of the scene's data were made of; asked after compiling."""
+        """Free the images that were needed only for the texture arrays of the scene's data; call it after compiling."""
         for key in self._images.keys() - self._sampled:
             textures.delete(self.device, self._images.pop(key))
 
     def indices(self, topology: str) -> MeshIndices:
-        """The indices of `triangles`, or of `triangles_adjacency`, which are found when somebody first draws them."""
+        """Return the indices of `triangles`, or of `triangles_adjacency`, which are computed on first use."""
         if topology not in self._indices:
             indices, meshes = pack.with_adjacency(self.packed)
             buffer = self.device.ctx.buffer(indices.tobytes() or bytes(4))
@@ -253,7 +253,7 @@ class GpuScene(Struct, eq=False, dict=True):
         return self._indices[topology]
 
     def vertex_array(self, programs: ProgramCache, program: Program, topology: str) -> Any:
-        """The streams a program looks at, the object's transform once an instance, and the index buffer."""
+        """Return a vertex array with the streams that a program uses, transforms per instance, and the index buffer."""
         names = set(program.object)
         content: list[tuple[Any, ...]] = [
             (buffer, layout, name) for name, (buffer, layout) in self._streams.items() if name in names
@@ -270,25 +270,25 @@ class GpuScene(Struct, eq=False, dict=True):
         return programs.vertex_array(program, (id(self), "scene", topology), content, self.indices(topology).buffer)
 
     def previous(self) -> moderngl.Buffer:
-        """Where objects were in the frame before, kept as soon as a program looks at it."""
+        """Transforms of objects in the previous frame, stored from the first use on."""
         if self._before is None:
             self._stale_instances.clear()
             self._before = self.device.ctx.buffer(self.packed.instances.tobytes() or bytes(64))
         return self._before
 
     def previous_positions(self) -> moderngl.Buffer:
-        """Object-space positions of all vertices in the frame before, likewise; those of today where none is posed."""
+        """Object-space vertex positions in the previous frame, likewise; the current ones if no mesh is posed."""
         return self._posing.previous() if self._posing is not None else self._streams["in_position"][0]
 
     def _constant(self, name: str) -> tuple[moderngl.Buffer, str]:
-        """One value once an instance: draws begin at the object's own instance, so a single one would not do."""
+        """Return a buffer with one value per instance: draws start at the object's instance, so one would not do."""
         if name not in self._constants:
             values = np.tile(np.array(_ABSENT[name], np.float32), (max(1, len(self.packed.instances)), 1))
             self._constants[name] = self.device.ctx.buffer(values.tobytes())
         return self._constants[name], f"{SCENE_ATTRIBUTES[name]}/i"
 
     def texture(self, texture: Texture) -> tuple[int, int]:
-        """GL names of a material texture and its sampler."""
+        """Return the GL names of a material texture and its sampler."""
         image = self._images[texture.image, texture.srgb].glo
         self._sampled.add((texture.image, texture.srgb))
         key = (texture.min_filter, texture.mag_filter, texture.wrap_s, texture.wrap_t)
@@ -299,34 +299,34 @@ class GpuScene(Struct, eq=False, dict=True):
         return image, self._samplers[key]
 
     def load_images(self, wanted: list[Texture]) -> None:
-        """Decode and upload what is missing; decoding runs on all cores."""
+        """Decode and upload missing images; decoding runs on all cores."""
         missing = list(dict.fromkeys((t.image, t.srgb) for t in wanted if (t.image, t.srgb) not in self._images))
         if not missing:
             return
-        from concurrent.futures import ThreadPoolExecutor  # for scenes with images alone
+        from concurrent.futures import ThreadPoolExecutor  # only for scenes with images
 
         files = [key for key in missing if key[0].generated is None]
         with ThreadPoolExecutor() as pool:
             for key, pixels in zip(files, pool.map(lambda k: self.decode(*k), files), strict=True):
                 self._images[key] = self._upload(pixels, srgb=key[1])
         for key in missing:
-            if key[0].generated is not None:  # by this thread's context
+            if key[0].generated is not None:  # needs this thread's context
                 self._images[key] = self._upload(self.decode(*key), srgb=key[1])
 
     def environment(self) -> GpuTexture:
-        """The picture around the scene, decoded and uploaded when somebody first asks."""
+        """Return the scene's environment map, decoded and uploaded on first use."""
         if self._environment is None:
-            assert self.scene.environment is not None  # only a scene that has one is asked
+            assert self.scene.environment is not None  # called only for scenes that have one
             self._environment = self._upload(self.decode_light(self.scene.environment.image), srgb=True)
         return self._environment
 
     def resource(self, id: str) -> GpuTexture | moderngl.Buffer:
-        """What a plan's resource of the scene is: its environment, or one buffer that stands for all its data."""
+        """Return a resource of the scene: its environment, or one buffer that stands for all its data."""
         return self.data.buffers["scene_instance_block"] if id == SCENE_DATA.port else self.environment()
 
     @property
     def environment_content(self) -> Hashable:
-        """What the picture around the scene is decoded from: equal ones give the same texels, also of two scenes."""
+        """Return what the environment map is decoded from: equal values give the same texels, also for two scenes."""
         assert self.scene.environment is not None  # as above
         image = self.scene.environment.image
         return image, None if isinstance(image, MadeImage) else self.scene.files.get(os.path.abspath(image.path))
@@ -371,7 +371,7 @@ class GpuScene(Struct, eq=False, dict=True):
 
 
 def write_records(buffer: moderngl.Buffer, records: Records, numbers: npt.NDArray[np.int64]) -> None:
-    """Upload some of a table's records, by ascending number: neighbours at once, and all between them if many."""
+    """Upload some of a table's records, by ascending number, in runs; if there are many runs, all between them."""
     ends = np.flatnonzero(np.diff(numbers, prepend=-2, append=-2) != 1)
     if len(ends) > _MOST_RUNS:
         first = int(numbers[0])

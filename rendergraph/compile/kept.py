@@ -1,7 +1,7 @@
-"""What kept steps have made, for other pipelines that would make the same: a copy costs what filtering it does not.
+"""Cache the results of kept steps for other pipelines that would compute the same, such as filtered environment maps.
 
-Textures and buffers stay their executables' own, so nothing that one does is seen by another; what is passed on is
-copied when another pipeline, or the same with other parameters, comes in place of the one that made it.
+Executables own their textures and buffers, so none affects another. Results are copied when another pipeline, or the
+same one with other parameters, replaces the one that computed them.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     from rendergraph.gl.device import Device
 
 Content: TypeAlias = Hashable
-"""All that decides what a kept resource holds: equal ones hold the same bits."""
+"""Everything that determines the contents of a kept resource: if equal, all bits are equal."""
 
 _Held: TypeAlias = "GpuTexture | moderngl.Buffer"
 
 
 class KeptValues(Struct, eq=False):
-    """The last few values that were made, whichever pipeline, scene or parameters they are of.
+    """The latest values of all pipelines, scenes and parameters.
 
     Attributes:
-        limit: bytes of all copies together; the least recently used ones are freed first.
+        limit: total bytes of all copies; the least recently used are freed first.
     """
 
     device: Device
@@ -41,7 +41,7 @@ class KeptValues(Struct, eq=False):
     _copies: dict[Content, _Held] = field(default_factory=dict)
 
     def save(self, executable: Executable) -> None:
-        """Copy what it has made since it was asked last."""
+        """Copy the values that an executable has computed since the last call."""
         if executable.due or not (executable.has_new_kept and executable.shares_kept):
             return
         executable.has_new_kept = False
@@ -55,7 +55,7 @@ class KeptValues(Struct, eq=False):
             self._delete(self._copies.pop(next(iter(self._copies))))
 
     def restore(self, executable: Executable) -> None:
-        """Copy what is there of what it is about to make; the steps that make it have not to run."""
+        """Copy cached values into an executable, which skips the steps that would compute them."""
         if not (executable.due and executable.shares_kept and self._copies):
             return
         there = {id: content for id, content in contents(executable).items() if content in self._copies}
@@ -92,15 +92,15 @@ class KeptValues(Struct, eq=False):
 
 
 def contents(executable: Executable) -> Mapping[str, Content]:
-    """Of each kept resource all that it is made of: steps with their parameters and texts, and the environment.
+    """Return everything that determines each kept resource: steps with parameters and texts, and the environment.
 
-    They look at nothing else: what a kept value may not depend on, `expand` and `check_kept_text` refuse.
+    They depend on nothing else: `expand` and `check_kept_text` refuse other dependencies.
     """
     resources = executable.plan.resources
     steps = {
         compiled.step.key: (
             compiled.step,
-            repr(step_uniforms(compiled.step)),  # 0.0 and -0.0 are equal, and two values
+            repr(step_uniforms(compiled.step)),  # as text, because 0.0 equals -0.0
             *(tuple(draw.program.texts.items()) for draw in compiled.draws),
         )
         for compiled in executable.steps[0]
@@ -118,7 +118,7 @@ def contents(executable: Executable) -> Mapping[str, Content]:
                 break
             ids = more
         if any(executable.uploads[key].upload.sources for key in makers if key in executable.uploads):
-            continue  # made of a scene that changes
+            continue  # computed from a scene that changes
         if SCENE_DATA.port in ids:
             continue  # likewise
         environment = any(resources[other].role == "scene" for other in ids)

@@ -1,4 +1,4 @@
-"""Means of light over the moments in which the camera's shutter is open, for `subframes`."""
+"""Average light over the moments of the open shutter, for `subframes`."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ _ALL_BARRIERS = 0xFFFFFFFF
 
 
 def averaged_textures(plan: ResourcePlan, semantics: Mapping[str, Semantic]) -> dict[int, dict[str, bool]]:
-    """Return by position in the schedule the textures that are averaged before that step, and whether they are encoded.
+    """Return, by position in the schedule, the textures to average before that step, and whether they are encoded.
 
-    Scene-linear light is averaged where a step reads it that makes display colours, and at the end of the frame in
-    outputs. Outputs of display colours that have been made from no such light are decoded for their mean.
+    Scene-linear light is averaged before a step that converts it to display colours, and in outputs at the end of the
+    frame. Outputs of display colours that do not come from such light are decoded for averaging.
     """
     resources, steps = plan.resources, plan.schedule.steps
     encodings = {
@@ -41,7 +41,7 @@ def averaged_textures(plan: ResourcePlan, semantics: Mapping[str, Semantic]) -> 
     found: dict[int, dict[str, bool]] = {}
     averaged: set[tuple[str, int]] = set()
     newest: dict[str, int] = {}
-    derived: set[str] = set()  # what has been made from a mean
+    derived: set[str] = set()  # resources computed from a mean
     for position, step in enumerate(steps):
         shows = any(encodings.get(write.resource) == "display" for write in step.writes)
         for read in step.all_reads:
@@ -62,11 +62,11 @@ def averaged_textures(plan: ResourcePlan, semantics: Mapping[str, Semantic]) -> 
 
 
 class LightMeans(Struct, eq=False):
-    """Sums of the light of a frame's moments, which the last moment divides and writes back where it was read.
+    """Sums of light over a frame's moments; the last moment divides them and writes the means back.
 
     Attributes:
-        stops: as from `averaged_textures`.
-        moment, count: the moment that is drawn, from 0, and how many there are.
+        stops: the result of `averaged_textures`.
+        moment, count: the current moment, from 0, and the number of moments.
     """
 
     executable: Executable
@@ -77,7 +77,7 @@ class LightMeans(Struct, eq=False):
     _programs: dict[tuple[int, str], tuple[Any, Any]] = field(default_factory=dict)
 
     def calls(self, parity: int) -> dict[int, Call]:
-        """Return what runs before the steps at some positions of the schedule; the last is behind all steps."""
+        """Return the calls to insert before some positions of the schedule; the last position is after all steps."""
         return {at: partial(self._add_all, parity, names) for at, names in self.stops.items()}
 
     def _add_all(self, parity: int, names: Mapping[str, bool]) -> None:

@@ -1,4 +1,4 @@
-"""The plan's physical textures as GL objects, and the views, framebuffers and samplers that look at them."""
+"""The plan's physical textures as GL objects, with their views, framebuffers and samplers."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _STATUS = {
 
 
 class Attachment(Struct, frozen=True):
-    """A texture level and layer a framebuffer draws to; `layer` None attaches all layers."""
+    """A mip level and layer of a texture as a render target; `layer` None attaches all layers."""
 
     texture: GpuTexture
     mip: int = 0
@@ -48,12 +48,12 @@ class Attachment(Struct, frozen=True):
 
 
 class Region(Struct, eq=False):
-    """A part of the picture that a node's `update` sets, and steps are drawn in.
+    """A part of the picture to which a node's `update` restricts its steps.
 
     Attributes:
         scissor: x, y, width and height; None for everything.
-        depth_bounds: least and greatest depth, for drivers that have depth bounds.
-        drawn: what the two were in the last frame.
+        depth_bounds: minimum and maximum depth, for drivers that support depth bounds.
+        drawn: both values in the last frame.
     """
 
     scissor: tuple[int, int, int, int] | None = None
@@ -63,7 +63,7 @@ class Region(Struct, eq=False):
     def set(
         self, scissor: tuple[int, int, int, int] | None = None, depth_bounds: tuple[float, float] | None = None
     ) -> None:
-        """Draw in this part from now on; in everything by default."""
+        """Restrict drawing to this part from now on; by default to nothing."""
         self.scissor, self.depth_bounds = scissor, depth_bounds or (0.0, 1.0)
 
     def use(self, framebuffer: moderngl.Framebuffer) -> None:
@@ -80,16 +80,16 @@ class _PooledTexture(Struct, eq=False):
 
 
 class TexturePool(Struct, eq=False):
-    """Textures that several executables share: only one draws at a time, and none reads what another left in them.
+    """Textures that several executables share: only one renders at a time, and none reads another's contents.
 
-    So variants of a pipeline, which differ in little more than a program, have one set of textures.
+    So similar variants of a pipeline use one set of textures.
     """
 
     device: Device
     _pooled: dict[TextureDesc, list[_PooledTexture]] = field(default_factory=dict)
 
     def acquire(self, desc: TextureDesc, number: int, label: str) -> GpuTexture:
-        """The texture of this description with this number, counted from 0 in each executable."""
+        """Return the texture with this description and number; numbers start from 0 in each executable."""
         of_desc = self._pooled.setdefault(desc, [])
         if number == len(of_desc):
             of_desc.append(_PooledTexture(textures.create(self.device, desc, label)))
@@ -101,15 +101,15 @@ class TexturePool(Struct, eq=False):
         """Free a texture when its last user releases it."""
         of_desc = self._pooled[texture.desc]
         next(pooled for pooled in of_desc if pooled.texture is texture).users -= 1
-        while of_desc and not of_desc[-1].users:  # executables use the first ones
+        while of_desc and not of_desc[-1].users:  # executables use the lowest numbers
             textures.delete(self.device, of_desc.pop().texture)
 
 
 class Memory(Struct, eq=False, dict=True):
     """Everything a pipeline allocates for one size.
 
-    `parity` is the frame number's: histories swap their two copies with it. `regions` are those that steps are
-    drawn in, by node and number; `of_scene` gives what the scene keeps, by its id.
+    `parity` is the frame number's: histories swap their two copies with it. `regions` are the regions of steps, by node
+    and number; `of_scene` returns a resource of the scene by its id.
     """
 
     device: Device
@@ -160,11 +160,11 @@ class Memory(Struct, eq=False, dict=True):
 
     @cached_property
     def parities(self) -> int:
-        """2 where any texture has a history, else 1."""
+        """2 if any texture has a history, else 1."""
         return 2 if any(len(places) == 2 for places in self.plan.placement.values()) else 1
 
     def texture(self, resource: str, parity: int = 0, *, previous: bool = False) -> GpuTexture:
-        """A resource's texture in its own format."""
+        """Return a resource's texture in its own format."""
         base = self.physicals[self._place(resource, parity, previous)]
         desc = self._desc(resource)
         if isinstance(base, MemoryBlock):
@@ -184,7 +184,7 @@ class Memory(Struct, eq=False, dict=True):
         return desc
 
     def part(self, resource: str, parity: int, read: Read) -> GpuTexture:
-        """What a reader samples: the texture, or a view of one mip or layer."""
+        """Return what a reader samples: the texture, or a view of one mip or layer."""
         texture = self.texture(resource, parity, previous=read.previous)
         if read.mip is None and read.layer is None:
             return texture
@@ -217,7 +217,7 @@ class Memory(Struct, eq=False, dict=True):
         scissor: tuple[int, int, int, int] | None = None,
         region: tuple[str, int] | None = None,
     ) -> moderngl.Framebuffer:
-        """A framebuffer whose `use()` also sets viewport, masks and scissor.
+        """Return a framebuffer whose `use()` also sets viewport, masks and scissor.
 
         moderngl cannot attach wrapped depth textures, mips or layers, so it is made over 1×1 renderbuffers, which raw
         calls then replace by the real attachments.
@@ -231,7 +231,7 @@ class Memory(Struct, eq=False, dict=True):
                 [self._dummy(number, depth=False) for number in range(len(colors))],
                 self._dummy(0, depth=True) if depth is not None else None,
             )
-        else:  # a step that only stores
+        else:  # a step that only stores images or buffers
             made = self.device.ctx.empty_framebuffer(size)
         raw = self.device.raw
         for number, color in enumerate(colors):
@@ -259,7 +259,7 @@ class Memory(Struct, eq=False, dict=True):
         return made
 
     def attachment(self, write: Write | Read, parity: int) -> Attachment:
-        """Where a step draws to."""
+        """Return the attachment of a step's target."""
         previous = isinstance(write, Read) and write.previous
         return Attachment(self.texture(write.resource, parity, previous=previous), write.mip or 0, write.layer)
 
@@ -272,7 +272,7 @@ class Memory(Struct, eq=False, dict=True):
         mip: int | None = None,
         layer: int | None = None,
     ) -> list[Call]:
-        """The calls that clear a texture, a mip or a layer; one seen through a view is drawn to (`textures.Clear`)."""
+        """Return calls that clear a texture, mip or layer; views are cleared by a framebuffer (`textures.Clear`)."""
         texture = self.texture(resource, parity)
         place = self.plan.placement[resource][0]
         if texture in self.physicals or self.plan.physicals[place].block:
@@ -307,7 +307,7 @@ class Memory(Struct, eq=False, dict=True):
             textures.delete(self.device, view)
         for sampler in self._samplers.values():
             self.device.raw.delete("glDeleteSamplers", sampler)
-        for planned, physical in zip(self.plan.physicals, self.physicals, strict=False):  # it may have failed midway
+        for planned, physical in zip(self.plan.physicals, self.physicals, strict=False):  # __init__ may have failed
             if self._is_scenes(planned):
                 continue
             if isinstance(physical, GpuTexture) and not self._is_kept(planned):

@@ -1,4 +1,4 @@
-"""Skinning and morphing: a compute shader moves the vertices of animated meshes whenever their pose has changed."""
+"""Skinning and morphing: a compute shader poses the vertices of animated meshes whenever their pose has changed."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class Posing(Struct, eq=False):
     """The animated meshes of a scene.
 
     Attributes:
-        streams: the buffers of positions, normals and, where the scene has some, tangents, which are written.
-        vertices: the same vertices as the scene's data, with the number of floats of each, once somebody reads it.
-        before: positions in the frame before, of all of the scene's vertices, once somebody reads them.
-        poses: what the buffers hold, by mesh.
-        stale: the meshes that have another pose than in the frame before.
+        streams: the buffers to write: positions, normals and, if the scene has any, tangents.
+        vertices: the vertices of the scene's data, with the number of floats per vertex, from their first use on.
+        before: previous positions of all of the scene's vertices, from their first use on.
+        poses: the pose in the buffers, by mesh.
+        stale: the meshes whose pose differs from the previous frame.
     """
 
     device: Device
@@ -46,7 +46,7 @@ class Posing(Struct, eq=False):
 
     @classmethod
     def make(cls, device: Device, scene: Scene, packed: PackedScene, streams: Mapping[str, moderngl.Buffer]) -> Posing:
-        """Upload the meshes at rest, and pose them as the scene has them."""
+        """Upload the meshes at rest, and pose them as in the scene."""
         parts: list[Floats] = []
         uniforms: dict[int, dict[str, tuple[int, ...]]] = {}
         begin = state = 0
@@ -75,7 +75,7 @@ class Posing(Struct, eq=False):
         return made
 
     def update(self, poses: Mapping[int, Pose]) -> bool:
-        """Move the vertices of meshes whose pose is another than before; return whether there are some."""
+        """Pose the vertices of meshes whose pose has changed; return whether there are any."""
         changed = {n: p for n, p in poses.items() if n not in self.poses or p.values != self.poses[n].values}
         self.poses |= changed
         self.stale |= changed.keys()
@@ -85,24 +85,24 @@ class Posing(Struct, eq=False):
         return bool(changed)
 
     def fill(self, vertices: moderngl.Buffer, width: int) -> None:
-        """From now on pose the vertices of the scene's data as well."""
+        """Also pose the vertices of the scene's data from now on."""
         self._program.release()
         self.vertices, self._program = (vertices, width), None
         self._dispatch(self.poses)
 
     def positions(self) -> Floats:
-        """Read back today's positions of all of the scene's vertices, float32 (v, 3)."""
+        """Read back the current positions of all of the scene's vertices, float32 (v, 3)."""
         return np.frombuffer(self.streams["positions"].read(), np.float32).reshape(-1, 3)
 
     def previous(self) -> moderngl.Buffer:
-        """Positions in the frame before, kept from now on."""
+        """Return the positions in the previous frame, stored from now on."""
         if self.before is None:
             self.before = self.device.ctx.buffer(reserve=self.streams["positions"].size)
             self.device.ctx.copy_buffer(self.before, self.streams["positions"])
         return self.before
 
     def advance(self) -> bool:
-        """Keep the positions as those of the frame before; return whether somebody reads those that have changed."""
+        """Save the positions as those of the previous frame; return whether previous positions are used and changed."""
         stale, self.stale = (self.stale if self.before is not None else set()), set()
         for number in stale:
             assert self.before is not None

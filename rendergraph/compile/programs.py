@@ -1,4 +1,4 @@
-"""Programs by source, compiled once while they are in use or were lately; errors at the author's line."""
+"""Programs by source, cached while they are used or recently used; errors are located at the author's line."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from rendergraph.resources import folder
 
 
 class ProgramCache(Struct, eq=False):
-    """Programs by their text, their outputs and the binding points of their blocks, least recently used first.
+    """Programs by text, outputs and binding points of blocks, least recently used first.
 
     Attributes:
-        limit: how many programs are kept; all that kept executables run are kept in any case.
+        limit: maximum number of programs; those of cached executables always stay.
     """
 
     device: Device
@@ -44,14 +44,14 @@ class ProgramCache(Struct, eq=False):
         shipped = os.path.join(folder("rendergraph.shaders"), "")
         for text in texts.values():
             if not all(str(file).startswith(shipped) for file in text.source.files):
-                from rendergraph.glsl.expansion import check_expansion  # our own need no looking into
+                from rendergraph.glsl.expansion import check_expansion  # shipped shaders need no check
 
                 check_expansion(text.source)
         stored = _beyond_limit(sources.values()) if self.device.stores_blocks else ()
         try:
             program = programs.link(self.device, sources, outputs, stored)
         except programs.ProgramError as error:
-            from rendergraph.program.messages import compile_problems, link_problems  # where a driver refuses alone
+            from rendergraph.program.messages import compile_problems, link_problems  # only for errors of the driver
 
             stage, message = programs.driver_message(error)
             found = (
@@ -65,14 +65,14 @@ class ProgramCache(Struct, eq=False):
         return program
 
     def vertex_array(self, program: Program, key: tuple[object, ...], content: Any, index: Any = None) -> Any:
-        """The vertex array of a program over buffers, made once; `content` is moderngl's."""
+        """Return a program's vertex array over buffers, created once; `content` is moderngl's."""
         full = (program.glo, *key)
         if full not in self._vertex_arrays:
             self._vertex_arrays[full] = self.device.ctx.vertex_array(program.object, content, index)
         return self._vertex_arrays[full]
 
     def forget(self, marker: object) -> None:
-        """Free the vertex arrays over buffers that go away; `marker` is the first part of their keys."""
+        """Free the vertex arrays over buffers that are released; `marker` is the first part of their keys."""
         for key in [key for key in self._vertex_arrays if len(key) > 1 and key[1] == marker]:
             self._vertex_arrays.pop(key).release()
 
@@ -102,7 +102,7 @@ class ProgramCache(Struct, eq=False):
 def _beyond_limit(texts: Iterable[str]) -> set[str]:
     """Return the blocks that become storage blocks so that no stage declares more than two uniform blocks.
 
-    Views are the last to go: pixels outside a triangle, whose values derivatives need, get nothing from storage.
+    Views come last: helper invocations, which derivatives need, read nothing from storage blocks.
     """
     stored: set[str] = set()
     for text in texts:
@@ -113,7 +113,7 @@ def _beyond_limit(texts: Iterable[str]) -> set[str]:
 
 
 def _return_free_memory() -> None:
-    """Return to the system what compiling left in the C library's heap, several times what programs take."""
-    malloc_trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # glibc's alone
+    """Return the C library's free heap to the system: compiling leaves several times the size of the programs."""
+    malloc_trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # only in glibc
     if malloc_trim is not None:
         malloc_trim(0)

@@ -1,13 +1,13 @@
-"""Which steps of a frame have to run: those whose result is gone, or was made of something that has changed.
+"""Choose the steps of a frame that must run: those whose result is lost, or depends on something that has changed.
 
-What a step leaves in a texture or buffer is a *value*, a version of a resource. It is decided by the values that the
-step starts from and by *sources* outside of the graph: views, lights, transforms, parameters, what the CPU wrote.
-`Reuse` knows which values the memory holds. A frame needs those that are shown; going back from there, a step runs
-where the value that it makes is not there, or where a step that runs before its reader writes over it. So aliased
-memory stays as small as it was, and what it still holds is not drawn again.
+The result of a step in a texture or buffer is a *value*, a version of a resource. It depends on the values that the
+step reads and on *sources* outside the graph: views, lights, transforms, parameters, data that the CPU wrote. `Reuse`
+tracks which values the memory holds. A frame needs the values of its outputs; going backwards from these, a step runs
+if its value is missing, or if another step overwrites it before it is read. So aliasing still saves memory, and values
+that survive in it are not computed again.
 
-From one state of the memory and one set of changed sources the same always follows: it is worked out once, and a frame
-that is like one before costs a lookup.
+The choice depends only on the state of the memory and the set of changed sources. It is computed once for each pair and
+then looked up.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ Value: TypeAlias = tuple[str, int]
 Source: TypeAlias = "str | tuple[object, ...]"
 """A block of the scene or of the frame, or `("view", table)`, `("step", key)` for parameters, `("buffer", id)`, …"""
 
-_Slot: TypeAlias = int | str  # a physical, by index; a history, whose two take turns, by its id
+_Slot: TypeAlias = int | str  # a physical texture by index; a history, which alternates between two, by its id
 _State: TypeAlias = frozenset[tuple[_Slot, Value]]
 
 _MOST_KNOWN = 512
-"""Moves from state to state that are remembered."""
+"""Maximum number of cached choices."""
 
 
 class _StepState(Struct, frozen=True):
-    """What a step starts from and what it leaves, and where that lies."""
+    """The values that a step needs and leaves, with their memory slots."""
 
     needs: tuple[tuple[_Slot, Value], ...]
     leaves: tuple[tuple[_Slot, Value], ...]
 
 
 class Reuse(Struct, eq=False, dict=True):
-    """What of a plan has to run, frame after frame.
+    """Chooses the steps of a plan that must run in each frame.
 
     Attributes:
         step_sources: the sources of each step besides other steps; called when a second frame is drawn.
@@ -57,19 +57,19 @@ class Reuse(Struct, eq=False, dict=True):
     _known: dict[tuple[_State, frozenset[Source], bool], tuple[tuple[int, ...], _State]] = field(default_factory=dict)
 
     def forget(self) -> None:
-        """Nothing is there any more."""
+        """Assume that the memory holds no values."""
         self._state, self._complete = None, False
 
     def choose(self, changed: frozenset[Source], repeats: bool = False) -> tuple[int, ...] | None:
-        """The positions of the steps that the next frame runs, in order, except for kept values; None for all steps.
+        """Return the positions of the steps for the next frame, in order, without kept steps; None for all steps.
 
-        `changed` are the sources that have changed since the last frame was chosen. A frame that `repeats` that one
-        finds the same in history, and leaves its own history where that one has.
+        `changed` are the sources that have changed since the last call. A frame that `repeats` the last one reads the
+        same history, and overwrites the history that the last one wrote.
         """
         if not self._complete:
             self._state, self._complete = None, True
             return None
-        if self._state is None:  # all has run once; what that leaves is asked for now that there is a second frame
+        if self._state is None:  # all steps have run once; the state is computed only for a second frame
             self._state = frozenset(self._missing(set(range(len(self._step_states))), {})[1].items())
         key = self._state, changed, repeats
         if key not in self._known:
@@ -85,7 +85,7 @@ class Reuse(Struct, eq=False, dict=True):
             slot: value
             for slot, value in state
             if (repeats or isinstance(slot, int)) and self._makers[value] not in stale
-        }  # a history's two textures have changed places unless the frame repeats the one before
+        }  # histories have swapped their textures unless the frame repeats the previous one
         run = self._back_from_goals(held)
         while True:
             missing, after = self._missing(run, held)
@@ -94,7 +94,7 @@ class Reuse(Struct, eq=False, dict=True):
             run |= {self._makers[value] for _, value in missing}
 
     def _back_from_goals(self, held: Mapping[_Slot, Value]) -> set[int]:
-        """The steps that make what is shown, as far as it is not held, and all that these start from."""
+        """Return the steps that compute missing values of the goals, and all steps that these need."""
         run: set[int] = set()
         wanted = [value for slot, value in self._goals if held.get(slot) != value]
         while wanted:
@@ -107,7 +107,7 @@ class Reuse(Struct, eq=False, dict=True):
     def _missing(
         self, run: set[int], held: Mapping[_Slot, Value]
     ) -> tuple[list[tuple[_Slot, Value]], dict[_Slot, Value]]:
-        """What a step of these does not find where it should be, and else what the frame leaves."""
+        """Return the values that one of the steps in `run` would miss, and the memory's state at that point."""
         now = dict(held)
         for position in sorted(run):
             touched = self._step_states[position]
@@ -117,7 +117,7 @@ class Reuse(Struct, eq=False, dict=True):
         return [(slot, value) for slot, value in self._goals if now.get(slot) != value], now
 
     def _stale(self, changed: frozenset[Source], always: set[int]) -> set[int]:
-        """The steps whose values are no longer what they would make; those in `always` see others in each frame."""
+        """Return the steps whose values are out of date; those in `always` are so in every frame."""
         stale: set[int] = set()
         for position, touched in enumerate(self._step_states):
             again = position in always or not changed.isdisjoint(self._sources[position])
@@ -144,7 +144,7 @@ class Reuse(Struct, eq=False, dict=True):
 
     @cached_property
     def _goals(self) -> list[tuple[_Slot, Value]]:
-        """What must be there at the end of a frame: what is shown, and what the next one remembers."""
+        """The values required at the end of a frame: outputs, and history for the next frame."""
         shown = set(self.plan.schedule.outputs.values())
         shown |= {id for id in self._versions.writers if self.plan.resources[id].role == "history"}
         return [self._at(id, last) for id in sorted(shown) if (last := self._last(id)) is not None and self._moves(id)]
@@ -157,7 +157,7 @@ class Reuse(Struct, eq=False, dict=True):
 
     @cached_property
     def _refilled(self) -> set[int]:
-        """Steps that touch buffers which the CPU fills before steps write them."""
+        """Steps that use buffers which the CPU fills before steps write them."""
         filled = {
             id
             for id in self._versions.writers
@@ -183,18 +183,18 @@ class Reuse(Struct, eq=False, dict=True):
             if version is not None and continues(step, write, self.plan.resources[write.resource]):
                 needs[self._at(write.resource, version)] = None
         leaves = [self._at(write.resource, write.version) for write in step.writes if self._moves(write.resource)]
-        # Layers that a step writes at once are versions after each other: what it makes itself it does not wait for.
+        # Layers that a step writes are successive versions, so values that it writes itself are not needed before it.
         return _StepState(tuple(needs.keys() - set(leaves)), tuple(leaves))
 
     def _moves(self, id: str) -> bool:
-        """Whether a resource is made anew in a frame, unlike what is kept or the scene's."""
+        """Return whether a resource is computed in each frame, unlike kept ones and those of the scene."""
         return self.plan.resources[id].role not in ("kept", "scene")
 
     def _last(self, id: str) -> int | None:
         return next(reversed(self._versions.writers.get(id, {})), None)
 
     def _before(self, id: str, version: int) -> int | None:
-        """The last version below this one that a step makes; None where none does."""
+        """Return the last version below this one that a step writes; None if there is none."""
         made = list(self._versions.writers.get(id, ()))
         found = bisect_right(made, version - 1)
         return made[found - 1] if found else None

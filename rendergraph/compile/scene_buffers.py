@@ -1,4 +1,4 @@
-"""What is behind inputs of `SceneData`: buffers and texture arrays, made when a step first reads them."""
+"""The buffers and texture arrays behind inputs of `SceneData`, created when a step first reads them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rendergraph.scene.scene_data import BORDER, Stored, TextureArrays
 from rendergraph.textures import Sampler
 
 ARRAY = "scene_array_"
-"""The beginning of the arrays' names in `scene.glsl`."""
+"""Prefix of the arrays' names in `scene.glsl`."""
 
 VERTICES, INSTANCES, TREE = "scene_vertex_texels", "scene_instance_block", "scene_tree"
 _INSTANCE_TEXELS = "scene_instance_texels"
@@ -33,8 +33,8 @@ class SceneBuffers(Struct, eq=False):
         buffers: the buffers by their names in `scene.glsl`; the indices are those of geometry passes.
         texels: textures that fetch from them, by name.
         instances: the records that the instance buffer holds.
-        arrays: where textures lie.
-        textures: texture arrays by their names in `scene.glsl`; they all have one `sampler`.
+        arrays: the location of each texture in the arrays.
+        textures: texture arrays by their names in `scene.glsl`; all use the same `sampler`.
     """
 
     device: Device
@@ -54,7 +54,7 @@ class SceneBuffers(Struct, eq=False):
         indices: moderngl.Buffer,
         images: Mapping[Stored, GpuTexture],
     ) -> SceneBuffers:
-        """Upload what a scene has not on the GPU yet, and copy its images, which have been uploaded, into arrays."""
+        """Upload the missing buffers of a scene, and copy its uploaded images into arrays."""
         instances = scene_data.instance_data(scene, packed)
         found = scene_data.texture_arrays({key: image.desc for key, image in images.items()})
         sizes = {key: image.desc.size for key, image in images.items()}
@@ -91,7 +91,7 @@ class SceneBuffers(Struct, eq=False):
 
 
 def _copy_with_border(device: Device, image: GpuTexture, array: GpuTexture, layer: int, key: Stored) -> None:
-    """Copy an image into the corner of a layer, with the texels around it that its wrap modes mean."""
+    """Copy an image into the corner of a layer, with a border that matches its wrap modes."""
     columns, rows = (
         [(last if wrap == "repeat" else 0, 0, 1), (0, BORDER, last + 1), (0 if wrap == "repeat" else last, last + 2, 1)]
         for wrap, last in zip(key[2:], (image.desc.width - 1, image.desc.height - 1), strict=True)
@@ -104,7 +104,7 @@ def _copy_with_border(device: Device, image: GpuTexture, array: GpuTexture, laye
 
 
 def check_size(device: Device, name: str, size: int, *, texel: int = 0) -> None:
-    """Refuse a buffer of the scene's that is larger than shaders can see; `texel`: bytes that they fetch at once."""
+    """Refuse a scene buffer that is larger than shaders can access; `texel`: bytes of one fetch."""
     most = texel * device.limits["texture_buffer"] if texel else device.limits["storage_block"]
     if size > most:
         kind = "texture buffer" if texel else "storage block"

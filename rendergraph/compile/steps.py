@@ -1,4 +1,4 @@
-"""Each step of a plan to its draws: program, units, blocks, framebuffer, state."""
+"""Compile each step of a plan into draws: program, units, blocks, framebuffer, state."""
 
 from __future__ import annotations
 
@@ -75,10 +75,10 @@ def compile_plan(
     *,
     poison: bool = False,
 ) -> Executable:
-    """Everything a plan needs on the GPU.
+    """Compile a plan, and allocate everything that it needs on the GPU.
 
     Args:
-        poison: overwrite released textures with a value that no picture should show.
+        poison: overwrite textures after their last use with a value that no picture should show.
     """
     check_plan(device.limits, plan, views)
     memory = Memory(device, plan, scene.resource, pool)
@@ -96,7 +96,7 @@ def compile_plan(
 
 
 class CountedDraw(Struct, eq=False):
-    """Draws as many of a step's commands as a buffer says (`GL_ARB_indirect_parameters`)."""
+    """Draws a step's commands, whose count is in a buffer (`GL_ARB_indirect_parameters`)."""
 
     raw: RawGL
     program: int
@@ -139,7 +139,7 @@ class _Compiler(Struct, eq=False, dict=True):
         self.geometry = GeometryCompiler(self.scene)
         self._barrier = partial(self.device.raw.glMemoryBarrier, _ALL_BARRIERS)
         self._geometry_draws: dict[tuple[str, int, int], list[Draw] | SortedDraws] = {}
-        # In a context of somebody else's such a query may be under way: there all is drawn.
+        # A borrowed context may already have an active query, so there everything is drawn.
         asked = {(step.node, step.if_drawn) for step in self.plan.schedule.steps} if self.device.owned else set()
         self._names = step_names(self.plan.schedule.steps)
         self._queries = {
@@ -147,7 +147,7 @@ class _Compiler(Struct, eq=False, dict=True):
         }
         self.uses_previous = False
         self._uploads: dict[tuple[str, int], UploadedValues] = {}
-        # Where a texture takes a block over: the driver, which knows of no sharing, has to be done with the others.
+        # When another texture takes over a memory block, the driver, unaware of sharing, must finish all earlier work.
         self._takeovers = {
             self.plan.lifetimes[id].first for block in self.plan.physicals if block.block for id in block.members
         }
@@ -185,7 +185,7 @@ class _Compiler(Struct, eq=False, dict=True):
         drawing.get(step.kind, self._transfer)(step, compiled, parity)
         if step.shaders:
             calls, units = image_calls(self.device, self.memory, step, parity)
-            compiled.before[:0] = calls  # clears may bind a framebuffer of their own
+            compiled.before[:0] = calls  # first, because clears may bind another framebuffer
             for draw in compiled.all_draws:
                 draw.uniforms |= {name: unit for name, unit in units.items() if name in draw.program.uniforms}
         self._watch(step, compiled)
@@ -197,7 +197,7 @@ class _Compiler(Struct, eq=False, dict=True):
             for write in stored
             if write.use == "buffer" and write.load == "clear"
         ]
-        if stored and step.kind != "copy":  # what shaders store waits for nobody by itself, and nobody for it
+        if stored and step.kind != "copy":  # OpenGL does not synchronise image and buffer stores
             compiled.before.insert(0, self._barrier)
             compiled.after.append(self._barrier)
         if self.poison:
@@ -207,7 +207,7 @@ class _Compiler(Struct, eq=False, dict=True):
         return compiled
 
     def _watch(self, step: Step, compiled: CompiledStep) -> None:
-        """See whether the step draws anything, where another one asks, and leave it out where it asks itself."""
+        """Add an occlusion query if another step depends on this one, and conditional rendering if this one depends."""
         first, last = compiled.watched
         after = self._queries.get((step.node, step.if_drawn)) if step.if_drawn is not None else None
         if after is not None:
@@ -232,7 +232,7 @@ class _Compiler(Struct, eq=False, dict=True):
         compiled.draws.append(draw)
 
     def _keep_units(self, steps: list[list[CompiledStep]]) -> None:
-        """Give a name that draws of one program read different textures under a unit of its own (see `Units`)."""
+        """Give a sampler for which draws of one program bind different textures a unit of its own (see `Units`)."""
         draws = [draw for compiled in steps for step in compiled for draw in step.all_draws]
         users: dict[tuple[int, str], list[Draw]] = {}
         for draw in draws:
@@ -335,7 +335,7 @@ class _Compiler(Struct, eq=False, dict=True):
     def _program(
         self, step: Step, parity: int, defines: Mapping[str, str], *, materials: Collection[str] = ()
     ) -> tuple[Program, list[Call], dict[str, Any]]:
-        """The program of a step with blocks bound and samplers given units."""
+        """Return the program of a step, its bindings and its uniforms, with blocks bound and units assigned."""
         outputs = [write.name for write in step.writes if write.use == "color"]
         blocks = dict(FIXED_BLOCKS)
         before_views: dict[str, str] = {}
@@ -355,7 +355,7 @@ class _Compiler(Struct, eq=False, dict=True):
                 buffers.append(partial(buffer.bind_to_storage_buffer, storage))
                 storage += 1
             elif view is not None and isinstance(use, Read):
-                if use.previous:  # what was drawn last frame has last frame's view
+                if use.previous:  # last frame's texture was drawn with last frame's view
                     before_views[f"{before}{use.name}_view_block"] = view
                 else:
                     blocks[f"{before}{use.name}_view_block"] = self.views.binding(view)
@@ -379,7 +379,7 @@ class _Compiler(Struct, eq=False, dict=True):
                 storage += 1
         try:
             program = self.programs.get(texts(), blocks, outputs)
-        except InputError as error:  # the driver only knows that names are missing
+        except InputError as error:  # the driver only reports undeclared names
             check_scene_includes(step, texts(), self.types)
             raise InputError(missing(step, texts(), self.types[step.node].cls) or error.problems) from error
         for name in before_views.keys() & program.block_names:
@@ -408,7 +408,7 @@ class _Compiler(Struct, eq=False, dict=True):
         return program, binds, uniforms
 
     def _check_stages(self, step: Step, texts: Mapping[str, StageText]) -> None:
-        """Refuse more storage blocks than a stage of this device may have; vertex shaders may have none."""
+        """Refuse more storage blocks than a stage of this device supports; vertex shaders may support none."""
         for stage, text in texts.items():
             count = sum(storage == "buffer" for storage, _, _ in declared_blocks(compiled_text(text.text)))
             if count > self.device.limits[f"{stage}_storage"]:
@@ -417,7 +417,7 @@ class _Compiler(Struct, eq=False, dict=True):
                 raise RenderError(step.problem("RG435", f"{what}; fragment and compute shaders have at least 8"))
 
     def _sample_positions(self, step: Step) -> dict[str, str]:
-        """Where the device has the samples of what a step draws to and reads."""
+        """Return macros with the device's sample positions in the step's targets and inputs."""
         descs = [self.plan.resources[read.resource].desc for read in step.all_reads]
         counts = {step.samples, *(desc.samples for desc in descs if isinstance(desc, TextureDesc))} - {1}
         texts = {count: [f"vec2({x}, {y})" for x, y in self.device.sample_positions(count)] for count in sorted(counts)}
@@ -427,7 +427,7 @@ class _Compiler(Struct, eq=False, dict=True):
         return partial(self._step_texts.of, step, macros)
 
     def _target(self, step: Step, compiled: CompiledStep, parity: int) -> None:
-        """Bind the framebuffer, clearing first what the step says."""
+        """Bind the framebuffer, after the step's clears."""
         colors = [write for write in step.writes if write.use == "color"]
         depth_write = next((write for write in step.writes if write.use == "depth"), None)
         depth: Write | Read | None = depth_write or next((r for r in step.reads if r.use == "depth_test"), None)
@@ -470,7 +470,7 @@ class _Compiler(Struct, eq=False, dict=True):
     def _clear(self, target: moderngl.Framebuffer, number: int | None, write: Write, parity: int) -> Call:
         texture = self.memory.texture(write.resource, parity)
         if FORMATS[texture.desc.format].family == "depth_stencil":
-            # Through a framebuffer it would heed the stencil's write mask, which is whatever a step before has stated.
+            # A framebuffer clear would use the stencil write mask of an earlier step.
             return Clear(self.device, texture, write.clear, mip=write.mip or 0, layer=write.layer)
         return clear_target(self.device, target, number, texture.desc.format, write.clear)
 
@@ -482,7 +482,7 @@ class _Compiler(Struct, eq=False, dict=True):
         has_depth = writes_depth or any(read.use == "depth_test" for read in step.reads)
         depth_test = has_depth and depth_default if state.depth_test is None else state.depth_test
         if not depth_test and writes_depth and state.depth_write is not False:
-            # OpenGL writes no depth where the test is off.
+            # OpenGL writes no depth if the depth test is off.
             depth_test, state = True, replace(state, depth_func="always")
         resolved = cull or ("none" if state.cull in ("material", "solid") else state.cull)
         clockwise = clockwise or state.front == "clockwise"

@@ -1,4 +1,4 @@
-"""What the device does without a program: clears, mip chains, copies; and images bound for compute shaders."""
+"""Operations without a program: clears, mip chains, copies; and image bindings of compute shaders."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ def transfer_calls(device: Device, memory: Memory, step: Step, parity: int) -> l
 
 
 def clear_buffer(device: Device, memory: Memory, write: Write, parity: int) -> Call:
-    """Zeros by the device itself: moderngl's clear maps the buffer, and so waits for whoever still reads it."""
+    """Return a call that clears a buffer on the device: moderngl's clear maps the buffer, and so waits for readers."""
     glo = memory.buffer(write.resource, parity).glo
     return partial(device.raw.glClearNamedBufferData, glo, _R8UI, _RED_INTEGER, _UNSIGNED_BYTE, None)
 
 
 def image_calls(device: Device, memory: Memory, step: Step, parity: int) -> tuple[list[Call], dict[str, int]]:
-    """The calls that bind and clear the images of a compute step, and the image unit of each name."""
+    """Return the calls that bind and clear the images of a compute step, and the image unit of each name."""
     images: list[Read | Write] = [read for read in step.reads if read.use == "image"]
     images += [write for write in step.writes if write.use == "image"]
     calls: list[Call] = []
@@ -85,6 +85,6 @@ def _resolve(device: Device, memory: Memory, step: Step, parity: int) -> list[Ca
         framebuffers = [memory.framebuffer([replace(end, layer=layer)], None, step.size) for end in (source, target)]
         names = [framebuffer.glo for framebuffer in framebuffers]
         box = (0, 0, *step.size)
-        calls.append(framebuffers[1].use)  # scissor and masks are the target's
+        calls.append(framebuffers[1].use)  # sets the target's scissor and masks
         calls.append(partial(device.raw.glBlitNamedFramebuffer, *names, *box, *box, _COLOR, _NEAREST))
     return calls

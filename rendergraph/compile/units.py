@@ -1,8 +1,8 @@
-"""Texture units: each pair of texture and sampler has its own, bound once a frame.
+"""Texture units: each pair of texture and sampler has its own, bound once per frame.
 
-Where a pipeline has more pairs than the driver has units, the last ones are shared and bound by the step itself. Where
-full-screen draws of one program read different textures under one name (a chain of blurs), the name keeps its unit and
-the draw binds its texture there: drivers look a program over anew when its samplers move to other units.
+If a pipeline has more pairs than the driver has units, the last units are shared, and steps bind them themselves. If
+full-screen draws of one program read different textures through one sampler (a chain of blurs), the sampler keeps its
+unit and each draw binds its texture there: drivers validate a program again when its samplers change units.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ SHARED_UNITS = 24
 
 
 class Units(Struct, eq=False):
-    """Units handed out while compiling, then bound by one call a frame."""
+    """Assigns units while compiling, and binds them once per frame."""
 
     device: Device
     parities: int
@@ -30,9 +30,9 @@ class Units(Struct, eq=False):
     _wrapped: dict[int, Any] = field(default_factory=dict)
 
     def unit(self, textures: tuple[int, ...], sampler: int, taken: list[Callable[[], object]]) -> int:
-        """The unit of a texture (one name a parity) with a sampler.
+        """Return the unit of a texture (one GL name per parity) with a sampler.
 
-        `taken` collects the binds that the asking draw has to make itself, empty unless units ran out.
+        `taken` collects the bindings that the draw must make itself; it stays empty unless units run out.
         """
         pair = (textures, sampler)
         if pair in self._pairs:
@@ -54,20 +54,20 @@ class Units(Struct, eq=False):
         return self.device.limits["units"] - SHARED_UNITS
 
     def changing(self, sampler: int) -> int | None:
-        """A unit with a sampler whose texture the draws bind; None where all are taken. Ask after the last `unit`."""
+        """Return a unit with a sampler whose texture draws bind; None if all are taken. Call it after `unit`."""
         if len(self._pairs) + len(self._changing) >= self._own:
             return None
         self._changing.append(sampler)
         return len(self._pairs) + len(self._changing) - 1
 
     def bind(self, texture: int, unit: int) -> Callable[[], object]:
-        """A call that binds a plain 2D texture; moderngl's costs a quarter of a raw one."""
+        """Return a call that binds a plain 2D texture; moderngl's takes a quarter of the time of a raw one."""
         if texture not in self._wrapped:
             self._wrapped[texture] = self.device.ctx.external_texture(texture, (1, 1), 4, 0, "f1")
         return partial(self._wrapped[texture].use, unit)
 
     def binds(self) -> list[list[Callable[[], object]]]:
-        """The calls that bind everything, a list a parity."""
+        """Return the calls that bind everything, one list per parity."""
         raw = self.device.raw
         pairs = [*self._pairs, *(((0,), sampler) for sampler in self._changing)]
         count = len(pairs)

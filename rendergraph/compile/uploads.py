@@ -1,4 +1,4 @@
-"""Values that the CPU gives textures and buffers, computed again only where what they are made of has changed."""
+"""Values that the CPU computes for textures and buffers, recomputed only if their sources have changed."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ SCENE_CHANGES = {
     "environment": "environment_block",
     "camera": "camera",
 }
-"""What of a scene can change, by the counters of `GpuScene.changes`."""
+"""The parts of a scene that can change, by the counters of `GpuScene.changes`."""
 
 
 class UploadedValues(Struct, eq=False):
-    """The values of one upload step; `step` returns it with today's parameters of its node."""
+    """The values of one upload step; `step` returns it with the current parameters of its node."""
 
     step: Callable[[], Step]
     scene: GpuScene
@@ -37,7 +37,7 @@ class UploadedValues(Struct, eq=False):
 
     @property
     def is_stale(self) -> bool:
-        """Whether the values have to be computed, for the first time or again."""
+        """Return whether the values must be computed, for the first time or again."""
         return self._made_of != self._sources
 
     @property
@@ -47,13 +47,13 @@ class UploadedValues(Struct, eq=False):
 
     @property
     def upload(self) -> Upload:
-        """What the step uploads."""
+        """The upload of the step."""
         found = dict(self.step().uniforms)["values"]
         assert isinstance(found, Upload)
         return found
 
     def compute(self) -> None:
-        """Compute the values; what a third-party function raises is passed on."""
+        """Compute the values; exceptions of third-party functions propagate."""
         values, (write,) = self.upload.values, self.step().writes
         if callable(values):
             desc = self.memory.plan.resources[write.resource].desc
@@ -61,7 +61,7 @@ class UploadedValues(Struct, eq=False):
             array = values(FrameScene(self.scene.scene, decode=self.scene.decode))
             try:
                 values = texels(write.name, array, desc, write.mip, write.layer)
-            except Misuse as error:  # the function has returned: its first line is the nearest
+            except Misuse as error:  # the function has returned, so its first line is the closest place
                 place = Place(shown_file(code.co_filename), code.co_firstlineno, 1) if code is not None else None
                 raise Misuse(str(error), error.code, place) from None
         self._array, self._made_of = values, self._sources

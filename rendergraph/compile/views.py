@@ -17,10 +17,10 @@ from rendergraph.steps import ViewMatrices
 
 
 class ViewBuffers(Struct, eq=False, dict=True):
-    """One buffer a view table, and the frame block.
+    """One buffer per view table, and the frame block.
 
     Attributes:
-        changed, moved_before: the tables that were uploaded since these were emptied, and those of the frame before.
+        changed, moved_before: the tables uploaded since these sets were emptied, and those of the previous frame.
     """
 
     device: Device
@@ -50,25 +50,25 @@ class ViewBuffers(Struct, eq=False, dict=True):
 
     @property
     def first_storage_binding(self) -> int:
-        """The first binding point of the steps' own buffers: lights and materials may be storage blocks too."""
+        """The first binding point for the steps' own buffers: lights and materials may be storage blocks, too."""
         return len(FIXED_BLOCKS) + (2 * len(self.tables) + 1 if self.device.stores_blocks else 0)
 
     def keep_previous(self, table: str) -> None:
-        """Keep from now on what a table's views were in the frame before: a program looks at them."""
+        """Store a table's views of the previous frame from now on, because a program uses them."""
         if table not in self._buffers or table in self._before:
             return
         if self.previous_binding(table) >= self.device.limits["uniform_bindings"]:
-            text = f"view table '{table}' and its frame before are more than this device binds at once"
+            text = f"view table '{table}' and its previous frame exceed the binding points of this device"
             raise RenderError(Problem("RG435", text))
         self._before[table] = self.device.ctx.buffer(reserve=max(1, self.tables[table].count) * VIEW.itemsize)
 
     @property
     def uses_previous(self) -> bool:
-        """Whether any program looks at views of the frame before."""
+        """Whether any program uses views of the previous frame."""
         return bool(self._before)
 
     def advance(self) -> None:
-        """From now on what the tables hold is what they held in the frame before."""
+        """Make the current views those of the previous frame."""
         for table, buffer in self._before.items():
             packed = self._packed.get(table)
             if packed is not None and self._packed_before.get(table) is not packed:
@@ -77,7 +77,7 @@ class ViewBuffers(Struct, eq=False, dict=True):
                 self.moved_before.add(table)
 
     def set(self, table: str, views: Sequence[ViewMatrices]) -> None:
-        """Upload a table's views where they differ from what it holds."""
+        """Upload a table's views if they have changed."""
         now = tuple(views)
         if table not in self._buffers:
             return
@@ -95,7 +95,7 @@ class ViewBuffers(Struct, eq=False, dict=True):
         self.changed.add(table)
 
     def set_frame(self, time: float, delta: float, index: int, still: int) -> bool:
-        """Upload the frame block where it differs; whether it does."""
+        """Upload the frame block if it has changed; return whether it has."""
         now = np.array([time, delta], np.float32).tobytes() + np.array([index, still], np.int32).tobytes()
         if now == self._frame_bytes:
             return False
@@ -104,7 +104,7 @@ class ViewBuffers(Struct, eq=False, dict=True):
         return True
 
     def bind(self) -> None:
-        """Bind every block to its point; once a frame."""
+        """Bind every block to its binding point; once per frame."""
         self.device.bind_block(self._frame, FIXED_BLOCKS["frame_block"])
         for name, buffer in self._buffers.items():
             self.device.bind_block(buffer, self.binding(name))

@@ -1,4 +1,4 @@
-"""What a node declares: ports and parameters. The one source for checking, schema, docs, uniforms and diffs."""
+"""Declarations of nodes: ports and parameters, the only source for checking, schema, docs, uniforms and diffs."""
 
 from __future__ import annotations
 

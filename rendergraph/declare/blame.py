@@ -1,4 +1,4 @@
-"""The places in a plugin author's files of declarations and of exceptions."""
+"""Locate declarations and exceptions in a plugin author's files."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from rendergraph.ports import Port
 def source_location(error: BaseException, *own: Path | str) -> Place | None:
     """Return the innermost line of an author's code that an exception, or else its cause, came through.
 
-    A syntax error is in its own line. Helpers beside a node count as the author's; the framework, NumPy and the like
-    do not. `own` are the author's files, folders, and modules, which stand for all of their packages.
+    A syntax error is located at its own line. Helpers beside a node count as the author's; the framework, NumPy and
+    the like do not. `own` lists the author's files, folders, and modules, which stand for their whole packages.
     """
     folders = [path for path in own if isinstance(path, Path)]
     packages = {module.partition(".")[0] for module in own if isinstance(module, str)}
@@ -50,7 +50,7 @@ def source_location(error: BaseException, *own: Path | str) -> Place | None:
 def declaration_of(cls: type[Node], file: Path, name: str = "") -> Place:
     """Return where a node declares a port, parameter or method, in its file or a base's; else the place of its class.
 
-    `file` is its module, or the shader that it is made of; an empty name means the node itself.
+    `file` is its module, or the shader that defines it; an empty name means the node itself.
     """
     if file.suffix == ".py":
         own = [base for base in cls.__mro__ if issubclass(base, Node) and base is not Node]
@@ -94,7 +94,7 @@ def _in_shader(text: str, name: str) -> tuple[int, int] | None:
 _MOST_CHARACTERS = 500
 """Limit of an exception's text in a message."""
 _OF_A_STRUCT = ("Unexpected keyword argument", "Missing required argument", "Extra positional arguments")
-"""The first words of exceptions of msgspec's constructors, which do not name the class."""
+"""Beginnings of errors from msgspec's constructors, which do not name the class."""
 
 
 def describe_error(error: BaseException) -> str:
@@ -110,8 +110,8 @@ def describe_error(error: BaseException) -> str:
 
 
 def _callee(error: BaseException) -> str:
-    """`Input(): `, from the source line of the call that raised."""
-    import traceback  # only where there is a mistake
+    """Return `Input(): `, from the source line of the call that raised."""
+    import traceback  # only for mistakes
 
     frames = traceback.extract_tb(error.__traceback__)
     line = linecache.getline(frames[-1].filename, frames[-1].lineno or 0) if frames else ""
@@ -120,10 +120,10 @@ def _callee(error: BaseException) -> str:
 
 
 def author_problem(error: BaseException, cls: type, file: Path | None = None, subject: str = "") -> Problem:
-    """Return what a node's own code raised, with the author's line; the caller relocates it and sets the code.
+    """Return the problem that a node's own code raised, with the author's line; the caller sets its place and code.
 
-    `file` is the place if the exception never came through the author's code. Of a call that the framework refused,
-    the exception's name is left out.
+    `file` is the place if the exception never came through the author's code. If the framework refused a call, the
+    exception's name is left out.
     """
     place = source_location(error, cls.__module__) or (error.place if isinstance(error, Misuse) else None)
     if place is None and file is not None and file.name:
@@ -137,15 +137,15 @@ def author_problem(error: BaseException, cls: type, file: Path | None = None, su
 
 
 def _input_hint(error: KeyError, cls: type[Node]) -> str:
-    """Say of a name that `facts.input` does not find whether the node has such an input."""
+    """Return a hint for a name that `facts.input` does not find: whether the node has such an input."""
     name = str(error.args[0]) if error.args else ""
     if name in cls.inputs():
-        return "; that input is not connected, ask `connected` first"
+        return "; that input is not connected; check `connected` first"
     return suggestion(name, cls.inputs(), most=0)
 
 
 def _attribute_hint(error: BaseException) -> str:
-    """A suggestion for a misspelt attribute of a node, or of a framework object that a node is given."""
+    """Return a suggestion for a misspelt attribute of a node, or of a framework object passed to it."""
     if not isinstance(error, AttributeError) or not error.name:
         return ""
     cls = type(error.obj)
@@ -158,7 +158,7 @@ def _attribute_hint(error: BaseException) -> str:
 
 
 def cause_chain(error: BaseException) -> Iterator[BaseException]:
-    """Yield an error, its cause, the cause of that, and so on."""
+    """Yield an error and its chain of causes."""
     found: BaseException | None = error
     while found is not None:
         yield found

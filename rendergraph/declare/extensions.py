@@ -1,4 +1,4 @@
-"""What plugins add beside node types: semantics, choices, readers of meshes and images, metrics, keys of scenes."""
+"""What plugins add besides node types: semantics, choices, readers of meshes and images, metrics, keys of scenes."""
 
 from __future__ import annotations
 
@@ -34,26 +34,26 @@ T = TypeVar("T")
 R = TypeVar("R")
 Include: TypeAlias = Annotated[str | Path, "the name of an include"]
 Word: TypeAlias = Annotated[
-    str, Matching(r"[a-z][a-z0-9]*(_[a-z0-9]+)*\Z"), "a word of small letters, digits and single '_'"
+    str, Matching(r"[a-z][a-z0-9]*(_[a-z0-9]+)*\Z"), "a word of lower-case letters, digits and single '_'"
 ]
 """A part of a macro's name."""
 Ending: TypeAlias = Annotated[
-    str, Matching(r"\.[a-z0-9][a-z0-9_-]*\Z"), "a file's ending, a dot and small letters as in '.stl'"
+    str, Matching(r"\.[a-z0-9][a-z0-9_-]*\Z"), "a file's ending, a dot and lower-case letters as in '.stl'"
 ]
 
 
-@dataclass(frozen=True, eq=False)  # no struct: help() would work out its types, and so import NumPy's
+@dataclass(frozen=True, eq=False)  # not a Struct: help() would resolve its types and import NumPy
 class MeshData:
     """Triangles of one material, as a mesh loader gives them: right-handed, +Y up, metres.
 
     Attributes:
         positions: (n, 3) finite numbers.
         indices: (m, 3) whole numbers below n, counter-clockwise seen from outside.
-        normals: (n, 3); the mean of the adjacent faces' by default, so that shared vertices are smooth.
+        normals: (n, 3); by default the mean over the adjacent faces, so that shared vertices are smooth.
         uv0, uv1: (n, 2) texture coordinates, origin at the image's top left.
         colors: (n, 3) or (n, 4), linear.
         name: of the object; the file's by default.
-        base_color, metallic, roughness: the material, where the scene file names none.
+        base_color, metallic, roughness: the material, if the scene file names none.
     """
 
     positions: npt.ArrayLike
@@ -69,24 +69,24 @@ class MeshData:
 
 
 class Extension(Struct, frozen=True):
-    """What a plugin adds beside node types, each by name; it is imported when the first name is asked for.
+    """What a plugin adds besides node types, each by name; it is imported when the first name is requested.
 
     It is found by the entry point group `rendergraph.extensions`, or as `EXTENSION` in `extension.py` at the top of a
     plugin's folder.
 
     Attributes:
         semantics: meanings of ports.
-        choices: parameter name to further choices of it, each with its include, relative to the folder of the
-            extension's module. The parameter's node says what the include defines; its opening comment is its
-            documentation, and `#pragma needs(…)` names what it needs and other choices do not.
+        choices: parameter name to further choices, each with its include, relative to the folder of the extension's
+            module. The parameter's node documents what the include must define. The include's opening comment is its
+            documentation, and `#pragma needs(…)` names what it needs beyond other choices.
         meshes: a file's ending (`.stl`) to the function that reads such a file, as a scene and as an object's `file`.
         scenes: a file's ending to the function that reads a whole scene, with materials, lights and cameras: from the
             path and a `rendergraph.scene.reading.Reading`, which opens further files and images, to a
             `rendergraph.scene.model.Scene`.
-        images: a file's ending to the function that decodes its bytes: (height, width), or with 1 to 4 channels behind,
-            the top row first, uint8 (sRGB where the slot is a colour) or floats (linear light).
-        metrics: name to a function of two pictures, (height, width, 3) in float64, sRGB-encoded from 0 to 1 where they
-            are display-referred and linear otherwise, the second the reference; the result grows with the error.
+        images: a file's ending to the function that decodes its bytes to (height, width) or (height, width, 1 to 4),
+            top row first, in uint8 (sRGB if the slot is a colour) or floats (linear light).
+        metrics: name to a function of a picture and its reference, (height, width, 3) in float64, sRGB-encoded from 0
+            to 1 if they are display-referred, else linear; the result must grow with the error.
         scene_keys: section of scene files (`objects`, `materials`, `lights`, `cameras`) to further keys of its entries.
         textures: kinds of generated textures for the materials of scene files.
     """
@@ -116,7 +116,7 @@ _TAKEN = {
 
 
 def extension_mistakes(extension: Extension, folder: Path) -> list[Problem]:
-    """Return what is wrong with an extension whose includes are in a folder; the subjects are its fields."""
+    """Return the mistakes in an extension whose includes are in a folder; the subjects are its fields."""
     if mistakes := list(mistakes_of(extension, "")):
         return mistakes
     for parameter, choices in extension.choices.items():
@@ -159,11 +159,11 @@ class Added(Struct, Generic[T], frozen=True):
     file: Path
 
     def run(self: Added[Callable[..., R]], code: str, doing: str, *arguments: Any) -> R:
-        """Call what was added; whatever it raises but `InputError` is an error at the author's line.
+        """Call the function that was added; any exception except `InputError` becomes an error at the author's line.
 
         Args:
             code: of the error.
-            doing: what could not be done, as a sentence without its end.
+            doing: what could not be done, as the beginning of a sentence.
             arguments: of the call.
 
         Raises:
@@ -189,9 +189,9 @@ class Source(Struct, frozen=True):
 
 
 class Extensions:
-    """What all plugins add. Asking for a name imports every extension, so only names nobody else knows are asked for.
+    """What all plugins add. A look-up imports every extension, so look up only names that are unknown elsewhere.
 
-    Two plugins that add one name are an error (RG496) for whoever asks for it.
+    If two plugins add the same name, looking it up is an error (RG496).
     """
 
     def __init__(self, find: Callable[[], Iterable[Source]] = tuple) -> None:
@@ -211,16 +211,16 @@ class Extensions:
 
     @property
     def problems(self) -> tuple[Problem, ...]:
-        """What is wrong with extensions, to be reported beside an unknown name, as it may be the reason."""
+        """Mistakes in extensions, reported together with an unknown name, because they may be the reason."""
         return tuple(problem for source in self.sources for problem in source.problems)
 
     @property
     def warnings(self) -> tuple[Problem, ...]:
-        """The same as warnings, for lists of everything, which leave out what is broken."""
+        """The same as warnings, for lists of everything, which leave out broken extensions."""
         return tuple(problem.as_warning() for problem in self.problems)
 
     def semantic(self, name: str) -> Semantic | None:
-        """A meaning by name, the framework's or a plugin's."""
+        """Return a semantic by name, the framework's or a plugin's."""
         for semantic in SEMANTICS:
             if semantic.name == name:
                 return semantic
@@ -228,23 +228,23 @@ class Extensions:
         return found.value if found is not None else None
 
     def choice(self, parameter: str, name: str) -> Added[Path] | None:
-        """The include of a plugin's choice of a parameter."""
+        """Return the include of a plugin's choice of a parameter."""
         return _one(f"choice of '{parameter}'", name, self.choices(parameter))
 
     def mesh_loader(self, ending: str) -> Added[MeshLoader] | None:
-        """The reader of mesh files of an ending."""
+        """Return the reader of mesh files with this extension."""
         return _one("mesh loader", ending.lower(), self.meshes())
 
     def scene_loader(self, ending: str) -> Added[SceneLoader] | None:
-        """The reader of whole scenes in files of an ending."""
+        """Return the reader of whole scenes in files with this extension."""
         return _one("scene loader", ending.lower(), self.scenes())
 
     def image_loader(self, ending: str) -> Added[ImageLoader] | None:
-        """The decoder of image files of an ending."""
+        """Return the decoder of image files with this extension."""
         return _one("image loader", ending.lower(), self._added("images"))
 
     def semantics(self) -> list[Added[Semantic]]:
-        """Plugins' meanings; equal ones of several plugins are listed once."""
+        """Return the semantics of plugins; equal ones of several plugins are listed once."""
         found: list[Added[Semantic]] = []
         for source, extension in self._usable():
             for value in extension.semantics:
@@ -253,26 +253,26 @@ class Extensions:
         return found
 
     def choices(self, parameter: str) -> list[Added[Path]]:
-        """The absolute includes of plugins' choices of a parameter."""
+        """Return the absolute includes of plugins' choices of a parameter."""
         return [added for name, added in self._choices() if name == parameter]
 
     def meshes(self) -> list[Added[MeshLoader]]:
-        """Loaders of mesh files, by ending."""
+        """Return the loaders of mesh files."""
         return self._added("meshes")
 
     def scenes(self) -> list[Added[SceneLoader]]:
-        """Loaders of whole scenes, by ending."""
+        """Return the loaders of whole scenes."""
         return self._added("scenes")
 
     def metrics(self) -> list[Added[Metric]]:
-        """Metrics of pictures, by name; two plugins with one name are an error."""
+        """Return the metrics of pictures; two with the same name are an error."""
         found: list[Added[Metric]] = self._added("metrics")
         for metric in found:
             _one("metric", metric.name, found)
         return found
 
     def scene_keys(self, section: str) -> list[Added[SceneKey]]:
-        """Keys of the entries in a section of scene files."""
+        """Return the keys of the entries in a section of scene files."""
         return [
             Added(key.name, key, source.plugin, source.file)
             for source, extension in self._usable()
@@ -282,7 +282,7 @@ class Extensions:
         ]
 
     def textures(self) -> dict[str, TextureKind]:
-        """Kinds of generated textures, their shaders absolute; two plugins with one name are an error."""
+        """Return the kinds of generated textures with absolute shader paths; two with the same name are an error."""
         added: list[Added[TextureKind]] = self._added("textures")
         return {
             one.name: replace(one.value, shader=one.file.parent / one.value.shader)
@@ -291,11 +291,11 @@ class Extensions:
         }
 
     def scene_key(self, section: str, name: str) -> Added[SceneKey] | None:
-        """A key by name; two plugins with one name are an error."""
+        """Return a key by name; two plugins with the same name are an error."""
         return _one(f"key of {section}", name, self.scene_keys(section))
 
     def listed(self) -> list[dict[str, str]]:
-        """Everything that plugins add, as plain values: `kind`, `name`, `plugin`, `doc`."""
+        """Return everything that plugins add, as plain values: `kind`, `name`, `plugin`, `doc`."""
         rows: list[tuple[str, Added[Any]]] = [("semantic", added) for added in self.semantics()]
         rows += self._choices()
         for field, kind in (
@@ -341,7 +341,7 @@ def _one(what: str, name: str, added: Sequence[Added[T]]) -> Added[T] | None:
 
 
 def _doc(value: object) -> str:
-    """The first line of the documentation of what a plugin adds."""
+    """Return the first line of the documentation of something that a plugin adds."""
     if isinstance(value, Path):
         return about(value)
     doc = value.doc if isinstance(value, Semantic | SceneKey | TextureKind) else inspect.getdoc(value) or ""
@@ -349,4 +349,4 @@ def _doc(value: object) -> str:
 
 
 NO_EXTENSIONS = Extensions()
-"""What the framework has without plugins."""
+"""The extensions without any plugin."""

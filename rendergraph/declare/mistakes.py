@@ -1,4 +1,4 @@
-"""What can be wrong with a node's declaration."""
+"""Mistakes in a node's declaration."""
 
 from __future__ import annotations
 
@@ -34,21 +34,21 @@ _OF_THE_FRAMEWORK = frozenset(
     MATERIAL_UV_STORAGE NO_EMISSIVE PASS_VIEW PASS_VIEW_COUNT SHADOW_LIGHT_COUNT UNIFORM_SCALE UNLIT
     """.split()  # noqa: SIM905 - a list of so many words reads best as text
 )
-"""Macros that shaders are given whatever the node declares."""
+"""Macros that shaders always get, whatever the node declares."""
 _ROLES = "param(…), define(…) or structural(…)"
 
 _METHODS = {"record": "self, steps", "update": "self, frame", "camera_jitter": "self, frame"}
-_TAKES_ANY = 0x04  # of a function with *arguments
+_TAKES_ANY = 0x04  # code flag of a function with *arguments
 _SOUND: WeakSet[type[Node]] = WeakSet()
-"""Classes without mistakes: every pipeline that is read asks, and an edited class is another one."""
+"""Cache of valid classes: they are checked for every pipeline, and an edited class is a new object."""
 
 
 def declaration_mistakes(cls: type[Node], *, lenient: bool = False) -> list[Problem]:
-    """Return what is wrong with a node's declaration; the subjects are ports and parameters, empty for the class.
+    """Return the mistakes in a node's declaration; the subjects are ports and parameters, empty for the class.
 
-    Names must be GLSL identifiers and distinct, also as macros; docs exist; types and defaults suit a shader and lie
-    inside their range; formats, kinds and words exist; rules name ports of this node. `lenient` accepts names with
-    capitals and missing docs, as other tools' shaders have them.
+    Names must be distinct GLSL identifiers, also as macros; docs must exist; types and defaults must suit a shader and
+    lie inside their range; formats, kinds and words must exist; rules must name ports of this node. `lenient` accepts
+    names with capitals and missing docs, as in shaders of other tools.
     """
     if cls in _SOUND:
         return []
@@ -57,9 +57,9 @@ def declaration_mistakes(cls: type[Node], *, lenient: bool = False) -> list[Prob
             return [_problem(name, f"'{name}' is reserved by the node's base class; choose another name")]
     try:
         cls.parameters()
-    except Exception as error:  # whatever evaluating an annotation raises
+    except Exception as error:  # evaluating an annotation can raise anything
         named = [name for name, hint in get_annotations(cls).items() if str(getattr(error, "name", None)) in str(hint)]
-        text = f"the types of its parameters cannot be worked out: {describe_error(error)}"
+        text = f"the types of its parameters cannot be resolved: {describe_error(error)}"
         return [_problem(next(iter(named), ""), text)]
     docs = [] if lenient else _docs(cls)
     found = [*_names(cls, lenient), *docs, *_ports(cls), *_macros(cls), *_parameters(cls)]
@@ -133,7 +133,7 @@ def _ports(cls: type[Node]) -> Iterator[Problem]:
     ports = cls.ports()
     for name, port in ports.items():
         wrong = list(mistakes_of(port, f"port '{name}'", name))
-        # Only if every field is valid on its own may fields be compared.
+        # Fields are compared only if each is valid on its own.
         yield from wrong or (_problem(name, text) for text in (*_alone(name, port), *_named(name, port, ports)))
 
 
@@ -165,7 +165,7 @@ def _alone(name: str, port: Port) -> Iterator[str]:
 
 
 def _named(name: str, port: Port, ports: Mapping[str, Port]) -> Iterator[str]:
-    """Mistakes in the names of other ports."""
+    """Yield mistakes in the names of other ports."""
     inputs, viewed, sampled = (Input, InOut), (Input, InOut, Views), (Input, WrittenPort)
     named: list[tuple[str, object, tuple[type[Port], ...], str]] = []
     if isinstance(port, WrittenPort):
@@ -184,8 +184,8 @@ def _named(name: str, port: Port, ports: Mapping[str, Port]) -> Iterator[str]:
 
 
 def _macros(cls: type[Node]) -> Iterator[Problem]:
-    """Two declarations that would define one macro."""
-    made: dict[str, list[tuple[str, str]]] = {}  # macro to the names that make it, each with what it is
+    """Yield declarations that would define the same macro."""
+    made: dict[str, list[tuple[str, str]]] = {}  # macro to the names that define it, with their descriptions
     for name in cls.inputs():
         for macro in (f"HAS_{name}".upper(), f"{name}_LAYERS".upper()):
             made.setdefault(macro, []).append((name, f"input '{name}'"))
@@ -201,7 +201,7 @@ def _macros(cls: type[Node]) -> Iterator[Problem]:
             text = f"{first} would define the macro {macro}, which is rendergraph's own; choose another name"
             yield _problem(name, text)
         if len(sources) > 1:
-            yield _problem(name, f"{words} would define one macro, {macro}; rename one")
+            yield _problem(name, f"{words} would define the same macro, {macro}; rename one")
 
 
 def _parameters(cls: type[Node]) -> Iterator[Problem]:
@@ -251,14 +251,14 @@ def _defaults(cls: type[Node]) -> Iterator[Problem]:
     try:
         if sound:
             cls()
-    except BaseException as error:  # the author's own check
+    except BaseException as error:  # a node's own check is third-party code
         if is_interruption(error):
             raise
         yield _problem("", f"it cannot be instantiated with its defaults: {describe_error(error)}")
 
 
 def _not_for_a_shader(parameter: Parameter) -> str:
-    """Why a parameter's type cannot become a uniform, or program text."""
+    """Return why a parameter's type cannot become a uniform, or program text."""
     kinds = {get_origin(part) or part for part in parts_of(parameter.type)}
     if parameter.role == "param":
         if kinds <= {bool, int, float, Literal} and not parameter.words:

@@ -1,4 +1,4 @@
-"""The base of every node."""
+"""The base class of all nodes."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from rendergraph.steps import Frame, Steps
 from rendergraph.typecheck import hints_of, quoted
 
 DROPPED: Any = None
-"""What a subclass sets a port of its base to that it does without: `depth = DROPPED`."""
+"""The value with which a subclass removes a port of its base: `depth = DROPPED`."""
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(param, define, structural))
 class Node:
-    """Base of every node: ports and parameters as class attributes, nothing more for a plain full-screen pass.
+    """Base class of all nodes: ports and parameters are class attributes; a full-screen pass needs nothing else.
 
     Instances are frozen and hold parameter values only; `dict(node)` has them. The type's name is the stem of its
     module.
     """
 
     def __init__(self, **values: Any) -> None:
-        """Take values of parameters; the others have their defaults."""
+        """Create a node with values of parameters; the others have their defaults."""
         parameters = self.parameters()
         wrong = []
         for name in values:
@@ -45,13 +45,13 @@ class Node:
         self.validate()
 
     def __iter__(self) -> Iterator[tuple[str, Any]]:
-        """Names and values of its parameters, for `dict(node)`."""
+        """Yield the names and values of the parameters, for `dict(node)`."""
         return ((name, getattr(self, name)) for name in self.parameters())
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in self)})"
 
-    if not TYPE_CHECKING:  # to which the class is a frozen dataclass
+    if not TYPE_CHECKING:  # type checkers see a frozen dataclass
 
         def __eq__(self, other: object) -> bool:
             return type(self) is type(other) and dict(self) == dict(other)
@@ -63,26 +63,26 @@ class Node:
             raise Misuse(f"'{name}' cannot be set: a node holds its parameters, which never change, and nothing else")
 
     shader: ClassVar[str | None] = None
-    """Shader of the default `record`: a fragment shader, or a compute shader, which ends in `.comp`; the type's name
-    with `.frag` where None."""
+    """Shader of the default `record`: a fragment shader, or a compute shader, which ends in `.comp`; None stands for
+    the type's name with `.frag`."""
 
     twin: ClassVar[str | None] = None
-    """Type that computes the same exactly and takes this one's place, with the same outputs: `"traced_shadows"`.
+    """Type with the same outputs that computes them exactly and can replace this one: `"traced_shadows"`.
 
-    `compare --reference` puts it there to find out how much of the error comes from this technique.
+    `compare --reference` substitutes it to find out how much of the error comes from this technique.
     """
 
     def validate(self) -> None:
-        """Refuse what types and limits of the parameters let through: `raise ValueError("far must be beyond near")`.
+        """Check what types and limits of parameters cannot express: `raise ValueError("far must be beyond near")`.
 
-        Called whenever a node is made. The message is shown at the value that is to blame, or at the node.
+        Called whenever a node is created. The message is shown at the value that causes it, or at the node.
         """
 
     def record(self, steps: Steps) -> None:
         """Append the steps of this pass; called before the schedule and without GL.
 
-        By default one full-screen step, or one dispatch over the first texture that is written or else read; none if
-        the node writes nothing, as one that only provides a function.
+        By default, record one full-screen step, or one dispatch over the first texture that is written or else read;
+        nothing if the node writes nothing, such as one that only provides a function.
         """
         if not any(isinstance(port, WrittenPort) for port in steps.ports.values()):
             return
@@ -93,20 +93,20 @@ class Node:
             steps.fullscreen(shader)
 
     def update(self, frame: Frame) -> None:
-        """Compute what changes each frame on the CPU: views, buffers. Called once a frame, before any step runs."""
+        """Compute what changes each frame on the CPU: views, buffers. Called once per frame, before any step runs."""
 
     def camera_jitter(self, frame: int) -> tuple[float, float]:
         """Return the camera's subpixel jitter in texels, each way from -1 to 1, for techniques that accumulate frames.
 
-        It applies to every pass drawn with the camera; the first node that runs decides. `frame` counts from 0 since
-        history began.
+        It applies to every pass drawn with the camera; the first node that runs decides. `frame` counts from 0 at the
+        start of the history.
         """
         return 0.0, 0.0
 
     @classmethod
     @cache
     def ports(cls) -> Mapping[str, Port]:
-        """Every port by name, in the order of declaration, bases first."""
+        """Return every port by name, in the order of declaration, bases first."""
         found: dict[str, Port] = {}
         for base in [base for base in reversed(cls.__mro__) if issubclass(base, Node)]:
             for name, value in vars(base).items():
@@ -119,13 +119,13 @@ class Node:
     @classmethod
     @cache
     def inputs(cls) -> Mapping[str, Input | InOut]:
-        """Ports that take links."""
+        """Return the ports that take links."""
         return {name: port for name, port in cls.ports().items() if isinstance(port, Input | InOut)}
 
     @classmethod
     @cache
     def outputs(cls) -> Mapping[str, Output | InOut | Function | Views]:
-        """Ports that others may read."""
+        """Return the ports that other nodes may read."""
         return {
             name: port
             for name, port in cls.ports().items()
@@ -135,7 +135,7 @@ class Node:
     @classmethod
     @cache
     def groups(cls) -> Mapping[str, tuple[str, ...]]:
-        """Group name to the inputs it stands for."""
+        """Return each group's name with its inputs."""
         table: dict[str, tuple[str, ...]] = {}
         for name, port in cls.inputs().items():
             if isinstance(port, Input) and port.group:
@@ -145,7 +145,7 @@ class Node:
     @classmethod
     @cache
     def parameters(cls) -> Mapping[str, Parameter]:
-        """Parameters by name, in the order of declaration."""
+        """Return parameters by name, in the order of declaration."""
         hints = hints_of(cls)  # resolved now, as annotations may name types that are defined later
         found: dict[str, Parameter] = {}
         for base in [base for base in reversed(cls.__mro__) if issubclass(base, Node)]:
@@ -160,5 +160,5 @@ class Node:
 
 
 def type_name(cls: type[Node]) -> str:
-    """Return the name of the node type of a class that no module stands for: its own in snake case."""
+    """Return the type name of a class that is not named after a module: the class's name in snake case."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()

@@ -16,7 +16,7 @@ _is_number = test_of(float)
 
 
 class FileContent(Struct, frozen=True):
-    """The file that a parameter names, relative to the file in which its value stands.
+    """The file that a parameter names, relative to the file that contains the value.
 
     Attributes:
         path: of the file, which exists.
@@ -37,7 +37,7 @@ InputFile: TypeAlias = Annotated[
 
 
 class Parameter(Struct, frozen=True, dict=True):
-    """The declaration of one parameter; see `param`, `define` and `structural`.
+    """The declaration of a parameter; see `param`, `define` and `structural`.
 
     Attributes:
         role: a uniform (`param`), program text (`define`) or part of the plan (`structural`). A bare value on the class
@@ -70,15 +70,15 @@ class Parameter(Struct, frozen=True, dict=True):
         return tuple(choice for choice in self.choices if isinstance(choice, str))
 
     def closed(self, added: tuple[str, ...] = ()) -> Any:
-        """Its type; a `Literal` of its own choices and the added ones if plugins add choices."""
+        """Return its type; if plugins can add choices, a `Literal` of its own and the added ones."""
         return Literal[(*self.words, *added)] if self.open_name else self.type
 
     def takes(self, added: tuple[str, ...] = ()) -> str:
-        """What a file may give, in words; `added` are the choices of plugins."""
+        """Return a description of the values that a file may give; `added` are the choices of plugins."""
         return words_for(self.closed(added), self.limits, file=True)
 
     def convert(self, value: object) -> Any:
-        """Return a file's value as its type has it: a list as a tuple, a whole number as a float.
+        """Convert a file's value to the parameter's type: a list to a tuple, a whole number to a float.
 
         Raises:
             TypeError: it does not fit the type: `expected a whole number`.
@@ -93,7 +93,7 @@ class Parameter(Struct, frozen=True, dict=True):
         return found
 
     def violation(self, value: object) -> str | None:
-        """What a value outside the limits must be; None for others."""
+        """Return what a value outside the limits must be; None for other values."""
         parts: tuple[Any, ...] = value if isinstance(value, tuple) else (value,)
         for number in parts:
             if _is_number(number) and (wrong := self.limits.violation(number)):
@@ -123,10 +123,10 @@ def param(
     glsl: str = "",
     unless: str = "",
 ) -> Any:
-    """A parameter that becomes a uniform: changing it rebuilds nothing.
+    """Declare a parameter that becomes a uniform: changing it rebuilds nothing.
 
     Args:
-        default: value where the file gives none.
+        default: value if the file gives none.
         doc: one line.
         unit: the unit's symbol, empty for a pure number.
         min, max: smallest and largest legal value, inclusive.
@@ -146,7 +146,7 @@ def define(
     choices: str = "",
     needs: tuple[str, ...] = (),
 ) -> Any:
-    """A parameter that becomes program text: `#define NAME value`, and `#define NAME_CHOICE` for a choice.
+    """Declare a parameter that becomes program text: `#define NAME value`, and `#define NAME_CHOICE` for a choice.
 
     Numbers and switches become `#define SAMPLES 16`; a choice `smith: fast` becomes `#define SMITH SMITH_FAST`, where
     every choice has a number, so that shaders can test `#if SMITH == SMITH_FAST`.
@@ -156,12 +156,12 @@ def define(
         choices: the name under which plugins add choices, for a type such as `Literal["neutral", "aces"] | str`. Each
             choice is then an include, the node's own `curve/aces.glsl` among its shaders or the shared includes; the
             shader includes it by `#include <CURVE>`, and there are no numbers.
-        needs: what such an include may ask for (`#pragma needs(…)`) that other choices do not need: `NEEDS_…` in the
+        needs: what such an include may request (`#pragma needs(…)`) and other choices do not need: `NEEDS_…` in the
             shader, `steps.needs(…)` in `record`.
     """
     return Parameter("define", default, doc, unit, Range(min, max), open_name=choices, needs=needs)
 
 
 def structural(*, default: Any, doc: str, unit: str = "", min: float | None = None, max: float | None = None) -> Any:
-    """A parameter that is part of the plan: a resolution, a light's name."""
+    """Declare a parameter that is part of the plan, such as a resolution or a light's name."""
     return Parameter("structural", default, doc, unit, Range(min, max))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rendergraph.keys import Key
 
 Section: TypeAlias = Literal["objects", "materials", "lights", "cameras"]
-"""A section of scene files whose entries plugins may add keys to."""
+"""A section of scene files to whose entries plugins may add keys."""
 _MOST_NUMBERS = 16
 
 
@@ -30,7 +30,7 @@ class SceneKey(Struct, frozen=True, dict=True):
     """A key that a plugin adds to objects, materials, lights or cameras of scene files: `Extension.scene_keys`.
 
     Attributes:
-        name: a word of small letters, digits and `_`.
+        name: a word of lower-case letters, digits and `_`.
         type: `float`, `int`, `bool`, `str`, a `Literal` of words, a tuple of 2 to 16 floats
             (`tuple[float, float, float]`), or `Image`. Keyframes can animate floats and tuples.
         doc: one line.
@@ -48,17 +48,17 @@ class SceneKey(Struct, frozen=True, dict=True):
     max: float | None = None
 
     def of(self, entry: Any) -> Any:
-        """Return the value that an object, material, light or camera has, or else the default.
+        """Return the value of an object, material, light or camera, or else the default.
 
-        It takes those of `facts` as well as those of a frame's scene.
+        It accepts those of `facts` and those of a frame's scene.
         """
         extra: Extra = entry.extra
         return extra.get(self.name, self.default)
 
     @cached_property
     def key(self) -> Key:
-        """It as a key of a table."""
-        from rendergraph.keys import Key  # for scene files with such keys alone
+        """The corresponding key of a table."""
+        from rendergraph.keys import Key  # only for scene files with such keys
 
         return Key(self.name, self._annotation(), self.doc, self.default, self.unit)
 
@@ -75,7 +75,7 @@ class SceneKey(Struct, frozen=True, dict=True):
         if (self.min is not None or self.max is not None) and not has_numbers:
             return "has limits, which are for numbers"
         if self.min is not None and self.max is not None and self.min > self.max:
-            return f"has the limits {self.min} and {self.max}, between which no number lies"
+            return f"has an empty range: min {self.min} > max {self.max}"
         if self.default is not None and self.type is Image:
             return "is an image, which has no default"
         annotation = self._annotation()
@@ -114,5 +114,5 @@ class TextureKind(Struct, frozen=True):
             if wrong := key.mistake():
                 return f"has the key '{key.name}', which {wrong}"
             if key.default is None or key.type in (str, Image) or get_origin(key.type) is Literal:
-                return f"has the key '{key.name}', which is no number or tuple with a default"
+                return f"has the key '{key.name}', which is not a number or tuple with a default"
         return "" if self.doc.strip() else "has no documentation (doc)"

@@ -15,17 +15,17 @@ LANE = 12.0  # height that a passing link takes within a column
 
 
 class Box(Struct, eq=False):
-    """A card, or the place where a link passes a column that it does not end in."""
+    """A card, or the place where a link passes through a column."""
 
     key: object  # the node's id, or anything unique for a passing link
     layer: int
     height: float
     y: float = 0.0  # top edge
-    ties: list[tuple[Box, float, float]] = []  # linked boxes, with the height of the link's end here and there
+    ties: list[tuple[Box, float, float]] = []  # linked boxes, with the heights of both ends of the link
 
 
 def layers_of(nodes: Sequence[str], links: Sequence[Link]) -> dict[str, int]:
-    """Return the column of every node: as early as possible, but nodes without inputs are beside their first reader."""
+    """Return the column of every node: as early as possible, but nodes without inputs next to their first reader."""
     import networkx as nx  # takes longer than checking a pipeline
 
     links = [link for link in links if not (link.previous or link.back)]
@@ -81,7 +81,7 @@ def _number(column: Sequence[Box]) -> None:
 
 
 def _middle(box: Box, side: int) -> float:
-    """Mean place of the linked boxes on one side, ports counting for fractions; its own place if there are none."""
+    """Return the mean position of the linked boxes on one side, with fractions for ports; its own if there are none."""
     ends = [other.y + there / (other.height + 1) for other, _, there in box.ties if other.layer == box.layer + side]
     return sum(ends) / len(ends) if ends else box.y
 
@@ -104,10 +104,10 @@ def _crossings(columns: Sequence[Sequence[Box]]) -> int:
 
 
 def _settle(column: list[Box]) -> None:
-    """Move each box as close to its linked boxes as the order allows, in least squares and without overlap.
+    """Move each box as close to its linked boxes as the order allows: least squares without overlap.
 
-    The offsets that remain after the boxes below each other are subtracted must not fall: pool adjacent violators
-    (Barlow, Bartholomew, Bremner and Brunk 1972).
+    After subtracting the heights of preceding boxes, offsets must not decrease: pool adjacent violators (Barlow,
+    Bartholomew, Bremner and Brunk 1972).
     """
     offset = 0.0
     pools: list[tuple[float, float, int]] = []  # mean, weight, boxes

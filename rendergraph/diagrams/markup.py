@@ -1,4 +1,4 @@
-"""A graph as cards with ports, which every diagram shows, and as text for terminals, DOT, Mermaid and JSON."""
+"""A graph as cards with ports, for all diagrams, and as text for terminals, DOT, Mermaid and JSON."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Link(Struct, frozen=True):
 
 
 def format_texture(desc: TextureDesc) -> str:
-    """Return `rgba16f 1280×720`, with layers, mips and samples where there are several."""
+    """Return `rgba16f 1280×720`, with layers, mips and samples if there are several."""
     text = f"{desc.format} {desc.width}×{desc.height}"
     if desc.kind == "texture_cube":
         text += " cube"
@@ -177,7 +177,7 @@ def dot(graph: Graph) -> str:
 
 
 def _dot(word: str) -> str:
-    # In a DOT string a backslash starts an escape even where it precedes no quote.
+    # In a DOT string a backslash always starts an escape.
     return '"' + word.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
 
 
@@ -195,7 +195,7 @@ def _dot_table(card: Card) -> str:
 
 def mermaid(graph: Graph) -> str:
     """Return the graph as a Mermaid flowchart; links between the same nodes are one arrow with all ports on it."""
-    number = {node.id: place for place, node in enumerate(graph.nodes)}  # ids such as `end` are words of the language
+    number = {node.id: place for place, node in enumerate(graph.nodes)}  # ids such as `end` are keywords of Mermaid
     lines = ["flowchart LR"]
     for card in cards(graph):
         lines.append(f'  n{number[card.id]}["<b>{_mermaid(card.id)}</b><br/>{_mermaid(card.kind)}"]')

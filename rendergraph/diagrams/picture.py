@@ -1,4 +1,4 @@
-"""A graph as an SVG picture: cards with ports, links coloured by what they carry."""
+"""A graph as an SVG picture: cards with ports, and links coloured by semantic."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from rendergraph.diagrams.markup import Card, Link, Socket, cards, links
 from rendergraph.link import Endpoint, Graph
 
 ROW, HEAD, PAD, RADIUS = 20.0, 40.0, 12.0, 4.0
-CHARACTER = 6.65  # width of a character of the 11-pixel monospace, with some air
+CHARACTER = 6.65  # width of a character of the 11-pixel monospace, with some margin
 COLUMN_GAP = 60.0
 FONT = "ui-monospace,'DejaVu Sans Mono',Menlo,Consolas,monospace"
 TITLE_FONT = "system-ui,'DejaVu Sans',sans-serif"
 MARGIN = 24.0
 
-# One colour for each meaning, each at least 3:1 against white and against near-black, so that links show on any page.
+# One colour per semantic, with a contrast of at least 3:1 against white and near-black, to be visible on any page.
 COLORS = {
     **dict.fromkeys(("radiance", "display_color", "emissive", "luminance", "irradiance", "reflections"), "#c2701c"),
     **dict.fromkeys(("depth", "linear_depth", "shadow_map"), "#3b7dd8"),
@@ -67,7 +67,7 @@ def svg(graph: Graph) -> str:
 def draw(content: Sheet, marks: Mapping[str, Mark] = {}, highlights: Mapping[Link, str] = {}) -> str:
     """Return a stand-alone SVG document, left to right, for light and dark pages.
 
-    Marks highlight nodes, highlights links, with a colour; `-` before it means dashed.
+    Marks highlight nodes and highlights links, with a colour; a `-` before the colour means dashed.
     """
     return _Picture(content, marks, highlights).draw()
 
@@ -102,7 +102,7 @@ class _Picture:
         self.bottom = max((box.y + box.height for column in columns for box in column), default=0.0)
 
     def _make_trunks(self, columns: list[list[Box]]) -> list[Trunk]:
-        """Give the links of every output their lanes, and tie boxes and lanes together."""
+        """Assign lanes to the links of every output, and tie boxes and lanes together."""
         by_port: dict[tuple[str, str], list[Link]] = {}
         for link in self.links:
             if not (link.previous or link.back):
@@ -175,7 +175,7 @@ class _Picture:
             yield self._link(link, _bend(start, self._target(link), begin=True))
 
     def _return(self, link: Link, lane: float) -> str:
-        """Last frame's value, or what closes a cycle: out to the right, back beneath everything, in from the left."""
+        """Return the path of a link to last frame's value, or of one that closes a cycle: back beneath all cards."""
         (x, y), (end_x, end_y) = self._source(link), self._target(link)
         out, back = x + COLUMN_GAP * 0.4, end_x - COLUMN_GAP * 0.4
         return self._link(

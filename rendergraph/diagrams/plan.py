@@ -15,7 +15,7 @@ from rendergraph.schedule import step_names
 from rendergraph.steps import Resource, Step
 from rendergraph.textures import TextureDesc
 
-# A matrix wider than this is unreadable; lifetimes are then given as numbers.
+# A wider matrix is unreadable, so lifetimes are then given as numbers.
 MOST_COLUMNS = 160
 MOST_NAMES = 3
 
@@ -46,7 +46,7 @@ def use_of(step: Step, id: str) -> str:
 
 
 def ids_by_memory(plan: ResourcePlan) -> list[str]:
-    """Return resource ids so that those that share memory are together, in the order of time."""
+    """Return resource ids grouped by memory, in time order."""
     return sorted(plan.resources, key=lambda id: (plan.placement[id], plan.lifetimes[id].first, id))
 
 
@@ -59,7 +59,7 @@ def memory_name(plan: ResourcePlan, id: str) -> str:
 def plan_text(plan: ResourcePlan, *, every_step: bool = False) -> str:
     """Return order with reads, writes and reasons; lifetimes; sharing; culled nodes; bytes.
 
-    Steps in sequence that make kept values of one node share a row, unless `every_step` is asked for.
+    Consecutive steps of a node that compute kept values share a row, unless `every_step` is set.
     """
     resources = ids_by_memory(plan)
     groups = _groups(plan, every_step)
@@ -153,7 +153,7 @@ def _order_rows(plan: ResourcePlan, groups: Sequence[Sequence[int]]) -> list[tup
 
 
 def _first(ids: Sequence[str]) -> str:
-    """The first few, each once; the matrix below has all of them."""
+    """Return the first few, each once; the matrix has all of them."""
     unique = list(dict.fromkeys(ids))
     more = [f"{len(unique) - MOST_NAMES} more"] if len(unique) > MOST_NAMES else []
     return ", ".join(unique[:MOST_NAMES] + more) or "-"
@@ -210,7 +210,7 @@ CELL, ROW, CHARACTER, MARGIN = 22.0, 20.0, 6.65, 20.0
 GROUP_GAP = 6.0
 BARS = 72.0  # height of the chart of live bytes
 
-# Read green and write red are what people know from other viewers; the letters carry it for those who cannot tell.
+# Green for reads and red for writes, as in other viewers; the letters help colour-blind readers.
 USES = {
     "R": ("#2c9163", "reads"),
     "W": ("#d0453e", "writes"),
@@ -223,7 +223,7 @@ STYLE = "\n" + Path(__file__).with_suffix(".css").read_text(encoding="ascii")
 def lifetimes_svg(plan: ResourcePlan) -> str:
     """Return lifetimes and memory as a stand-alone SVG document, for light and dark pages.
 
-    One row per resource, in a band with those in the same texture; below, the bytes alive at each step and the least
+    One row per resource, in a band with those in the same texture; below, the live bytes at each step and the least
     peak; then the nodes that do not run.
     """
     steps, names = plan.schedule.steps, step_names(plan.schedule.steps)

@@ -1,8 +1,8 @@
-"""YAML text to values that know where they stand.
+"""Parse YAML text into values with their places.
 
-Values are built from PyYAML's parse events, not by its loaders: those forget an alias's own place, run user-chosen
-constructors, read YAML 1.1 scalars (`1e-3` as text, `no` as false) and die in many ways on hostile text. Here nothing
-is built but text, numbers, switches, null, lists and mappings, every one under a budget.
+Values are built from PyYAML's parse events, not by its loaders: those lose the place of an alias, run constructors that
+the text chooses, read YAML 1.1 scalars (`1e-3` as text, `no` as false) and fail in many ways on hostile text. Here only
+text, numbers, switches, null, lists and mappings are built, all under a budget.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from rendergraph.system import STDIN
 
 
 def load(path: Path, *, limits: YamlLimits = YamlLimits(), keep_going: bool = False) -> Document:
-    """Return the values of a YAML file; see `parse`. Whether it may be read is the caller's question."""
+    """Return the values of a YAML file; see `parse`. The caller decides whether it may be read."""
     text = read_text(path, limits, str(path))
     return parse(text, str(path), path=path, limits=limits, keep_going=keep_going)
 
@@ -79,5 +79,5 @@ def is_standard_input(name: str | Path | None) -> bool:
 
 @lru_cache(maxsize=1)
 def _standard_input(stream: TextIO | None, most: int) -> bytes:
-    """The bytes of the stream, which can be read once only."""
+    """Return the bytes of the stream, which can be read only once."""
     return stream.buffer.read(most + 1) if stream is not None else b""

@@ -1,4 +1,4 @@
-"""YAML text to values: PyYAML's parse events, read by YAML 1.2's core schema, under budgets."""
+"""Parse YAML text into values: PyYAML's parse events, YAML 1.2's core schema, and budgets."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _BOOL = {"true": True, "True": True, "TRUE": True, "false": False, "False": Fals
 _INT = re.compile(r"[-+]?[0-9]+\Z")
 _BASED = re.compile(r"0o[0-7]+\Z|0x[0-9a-fA-F]+\Z")
 _FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?\Z")
-# Few values begin like a number and are none: this is compiled where one does.
+# Compiled on use, because few values begin like a number without being one.
 _SPECIAL = r"([-+]?)\.(?:inf|Inf|INF)\Z|\.(?:nan|NaN|NAN)\Z"
 _MOST_WHOLE = 2**63
 
@@ -59,7 +59,7 @@ class YamlLimits(Struct, frozen=True):
 
     Attributes:
         bytes: length of the text.
-        depth: lists and mappings inside each other; libyaml itself dies at about 25,000.
+        depth: nested lists and mappings; libyaml itself crashes at about 25,000.
         nodes: values after aliases are expanded.
         aliases: uses of `*name`.
     """
@@ -123,7 +123,7 @@ class _Builder(Struct, eq=False):
             if depth >= self.limits.depth:
                 raise self.stop("RG007", over_limit("depth", self.limits.depth), mark)
             if event.anchor:
-                self.anchors[event.anchor] = None  # open: a use inside would be a cycle
+                self.anchors[event.anchor] = None  # still open: a use inside would be a cycle
             items: list[Value] | dict[Any, Value] = [] if isinstance(event, yaml.SequenceStartEvent) else {}
             value = Value(items, self.source, line, column, key)
             if isinstance(items, list):
@@ -140,7 +140,7 @@ class _Builder(Struct, eq=False):
         return value
 
     def entry(self, parser: Any, event: Any, depth: int, into: dict[Any, Value]) -> bool:
-        """Add one key with its value; return false where the contents of the mapping cannot be known."""
+        """Add one key with its value; return False if the contents of the mapping cannot be known."""
         mark = event.start_mark
         merge = getattr(event, "value", None) == "<<" and event.implicit[0]
         name = self.build(parser, event, depth).data
@@ -176,7 +176,7 @@ class _Builder(Struct, eq=False):
         return Value(value.data, *place)
 
     def scalar(self, event: Any) -> Scalar | Broken:
-        # Plain or quoted is asked of `implicit`: tag and style are '' in the C parser where they are None in the other.
+        # `implicit` tells plain from quoted: tag and style are '' in the C parser but None in the Python one.
         if not event.implicit[0]:
             return str(event.value)
         try:
@@ -197,9 +197,9 @@ def parse(
     """Return the values of a YAML text.
 
     Args:
-        origin: how messages name it.
-        path: the file it comes from, to which its relative paths are relative.
-        keep_going: put mistakes that do not stop the reading into `Document.problems`.
+        origin: its name in messages.
+        path: the file that it comes from, to which its paths are relative.
+        keep_going: put mistakes that do not prevent reading into `Document.problems`.
     """
     import yaml  # loaded with the first file
 
@@ -207,7 +207,7 @@ def parse(
     source = Source(origin, path, text)
     if len(text) > limits.bytes or len(text.encode("utf-8", "surrogatepass")) > limits.bytes:
         raise InputError(Problem("RG007", over_limit("bytes", limits.bytes), Place(source.origin)))
-    # To compile a set of so many signs takes as long as to read a pipeline, and files are mostly text in lines.
+    # Compiling the large character set takes as long as reading a pipeline, and most files are plain lines of text.
     in_lines = text.replace("\n", "").replace("\r", "").replace("\t", "").isprintable()
     illegal = None if in_lines else re.search(_ILLEGAL, text)
     if illegal:
@@ -228,7 +228,7 @@ def parse(
     except yaml.MarkedYAMLError as error:
         raise InputError([*builder.problems, _syntax(source, error)]) from None
     except (yaml.YAMLError, ValueError, LookupError, AttributeError, RecursionError) as error:
-        # PyYAML leaks these on some malformed text.
+        # PyYAML raises these on some malformed text.
         reason = shown(str(error).splitlines()[0] if str(error) else type(error).__name__)
         raise InputError([*builder.problems, source.problem("RG001", f"not valid YAML: {reason}")]) from None
     if builder.problems and not keep_going:
@@ -239,8 +239,8 @@ def parse(
 def parser_of(text: str) -> object:
     try:
         from yaml.cyaml import CParser  # type: ignore[attr-defined]  # the stubs leave it out
-    except ImportError:  # PyYAML built without libyaml: the same events, ten times slower
-        from yaml import SafeLoader  # in its stead
+    except ImportError:  # PyYAML without libyaml: the same events, ten times slower
+        from yaml import SafeLoader  # only without libyaml
 
         return SafeLoader(text)
     return CParser(text)
@@ -254,7 +254,7 @@ def _syntax(source: Source, error: Any) -> Problem:
     char = source.line(line)[column - 1 : column] if line else ""
     start = error.context_mark
     if "mapping values are not allowed" in problem:
-        what = "a ':' cannot stand here; quote the text that holds it, or start a new line with the right indentation"
+        what = "a ':' is not allowed here; quote the text that has it, or start a new line with the right indentation"
     elif "cannot start any token" in problem and char == "\t":
         what = "a tab cannot indent; use spaces"
     elif "cannot start any token" in problem:
@@ -266,9 +266,9 @@ def _syntax(source: Source, error: Any) -> Problem:
     elif "flow mapping" in context:
         what, mark = "the '{' that starts here has no '}' or lacks a comma", start or mark
     elif "flow node" in context:
-        what = "a value is expected here; close the '[' or '{' before it, or take a comma away"
+        what = "a value is expected here; close the '[' or '{' before it, or remove a comma"
     elif "expected ':'" in problem:
-        what, mark = "this key has no ': ', a colon and a blank", start or mark
+        what, mark = "this key has no ': ', a colon and a space", start or mark
     elif "block" in context:
         what = "this does not fit what is above; check the indentation"
     else:

@@ -1,4 +1,4 @@
-"""Values with their places, and the sources they stand in."""
+"""Values with their places, and their sources."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Scalar: TypeAlias = "str | int | float | bool | None"
 Index: TypeAlias = "str | int | float"
 Data: TypeAlias = "Scalar | list[Value] | dict[Any, Value] | Broken"
 
-_BREAK = "\r\n|[\r\n\x85\u2028\u2029]"  # what YAML takes for the end of a line
+_BREAK = "\r\n|[\r\n\x85\u2028\u2029]"  # YAML's line breaks
 _LONGEST_LINE = 400
 
 
@@ -31,7 +31,7 @@ class Source(Struct, eq=False, dict=True):
     text: str = ""
 
     def beside(self, name: str) -> Path:
-        """Return the path that a name in it stands for, relative to the current folder if it is no file."""
+        """Return the path of a name relative to the source's folder; to the current one if the source is not a file."""
         return Path(os.path.normpath((self.path.parent if self.path else Path()) / name))
 
     @cached_property
@@ -39,7 +39,7 @@ class Source(Struct, eq=False, dict=True):
         return [0, *(match.end() for match in re.finditer(_BREAK, self.text))]
 
     def line(self, number: int) -> str:
-        """Return a line's text, counted from 1; empty where it does not exist or is too long to show."""
+        """Return a line's text, counted from 1; empty if it does not exist or is too long to show."""
         if not 0 < number <= len(self._starts):
             return ""
         text = self.text[self._starts[number - 1] : self._starts[number - 1] + _LONGEST_LINE + 1]
@@ -56,7 +56,7 @@ class Source(Struct, eq=False, dict=True):
 
 
 class Broken:
-    """Stands in for a value that is wrong and has been reported, while reading goes on."""
+    """Stands for a wrong value that has been reported, so that reading can continue."""
 
     def __repr__(self) -> str:
         return "BROKEN"
@@ -95,7 +95,7 @@ class Value(Struct, eq=False):
 
     @property
     def mapping(self) -> dict[Any, Value]:
-        """The entries of a mapping, none for other values."""
+        """The entries of a mapping; none for other values."""
         return self.data if isinstance(self.data, dict) else {}
 
     def updated(self, entries: Mapping[Any, Value]) -> Value:
@@ -126,7 +126,7 @@ class Value(Struct, eq=False):
         return found
 
     def plain(self) -> Any:
-        """Return Python data; what an alias repeats is one object, not copies."""
+        """Return Python data; repeated aliases are one object, not copies."""
         return _plain(self, {})
 
 
@@ -134,7 +134,7 @@ def _plain(value: Value, seen: dict[int, Any]) -> Any:
     data = value.data
     if not isinstance(data, dict | list):
         return data
-    # An alias's value shares `data` with its anchor's, so that a bomb of aliases costs what its text costs.
+    # An alias's value shares `data` with its anchor's, so that many nested aliases cost no more than their text.
     if id(data) not in seen:
         seen[id(data)] = (
             {key: _plain(child, seen) for key, child in data.items()}
@@ -148,8 +148,8 @@ class Document(Struct, frozen=True, eq=False, dict=True):
     """The values of one YAML file.
 
     Attributes:
-        problems: mistakes that did not stop the reading.
-        dropped: paths of what was left out because it was wrong, so that nothing else reports it as missing.
+        problems: mistakes that did not prevent reading.
+        dropped: paths of wrong values that were left out, so that they are not reported as missing.
     """
 
     root: Value
@@ -163,9 +163,9 @@ class Document(Struct, frozen=True, eq=False, dict=True):
 
 
 def from_plain(data: Any, source: Source) -> Value:
-    """Return Python data as values; tuples become lists, NumPy scalars and arrays become what they hold.
+    """Return Python data as values; tuples become lists, NumPy scalars and arrays their contents.
 
-    Below an argument of Python, the place of each value is its path of keys: `nodes.ao.params.radius`.
+    For an argument in Python, the place of each value is its path of keys: `nodes.ao.params.radius`.
     """
     if hasattr(data, "tolist"):
         data = data.tolist()
@@ -185,9 +185,9 @@ def from_plain(data: Any, source: Source) -> Value:
 
 
 def merge_patch(target: Value | None, patch: Value, *, keep_nulls: bool = False) -> Value:
-    """RFC 7386: mappings merge, null removes, everything else replaces; each value keeps its own place.
+    """Merge as in RFC 7386: mappings merge, null removes, everything else replaces; values keep their places.
 
-    With `keep_nulls` a null stays, to remove from what the result is merged into.
+    With `keep_nulls`, nulls stay, so that they remove when the result is merged into something else.
     """
     if not isinstance(patch.data, dict):
         return patch
@@ -220,7 +220,7 @@ def kind_of(data: object) -> str:
 
 
 def describe(value: Value) -> str:
-    """Describe a value for messages, or quote it where it is short."""
+    """Describe a value for messages, or quote it if it is short."""
     data = value.data
     if isinstance(data, str):
         return f"'{shown(data, 40)}'"

@@ -1,4 +1,4 @@
-"""Changes to the text of files: what is not changed stays byte for byte."""
+"""Edit the text of files: everything else stays byte for byte."""
 
 from rendergraph.edit.pipeline import PipelineText
 from rendergraph.edit.shader import upgraded_shader

@@ -1,7 +1,7 @@
-"""Changes to the text of a pipeline file, in the terms of its graph: nodes, links, parameters.
+"""Edit the text of a pipeline file in terms of its graph: nodes, links, parameters.
 
-A file that extends another holds only its differences. So what it inherits is changed by an entry of its own, and what
-it inherits is removed by a `null`.
+A file that extends another contains only differences. So inherited values are changed by a new entry, and removed by a
+`null`.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class PipelineText(Struct, eq=False):
     """A pipeline file that is being edited.
 
     Attributes:
-        text: what has become of it. A method that raises an `InputError` may have left a part of its change behind.
-        path: its file, to which what it names is relative.
-        notes: what the changes took along, one line each.
+        text: its current text. A method that raises an `InputError` may leave a partial change.
+        path: its file, to which its paths are relative.
+        notes: further effects of the changes, one line each.
     """
 
     text: str
@@ -52,7 +52,7 @@ class PipelineText(Struct, eq=False):
         self._set(("nodes", id), {"type": node_type, **{name: part for name, part in parts.items() if part}})
 
     def delete(self, id: str) -> None:
-        """Remove a node and the links to it, those that this file inherits by null."""
+        """Remove a node and the links to it; inherited links are removed by null."""
         self._node(id)
         for path, link in _links(self._whole()):
             links = link if isinstance(link, list) else [link]
@@ -63,7 +63,7 @@ class PipelineText(Struct, eq=False):
         self._set(("nodes", id), DELETED)
 
     def rename(self, id: str, new: str) -> None:
-        """Give a node another id, also in the links that this file has."""
+        """Rename a node, also in the links of this file."""
         self._node(id)
         self._require_new(new)
         if _at(self._inherited(), ("nodes", id)) is not None:
@@ -77,7 +77,7 @@ class PipelineText(Struct, eq=False):
     def connect(self, end: str, links: Sequence[str]) -> None:
         """Connect an input, `node.input`, or an output of the file, `outputs.name`."""
         if "inputs" not in (path := self._path(end, links[0])) and path[0] != "outputs":
-            raise _mistake("RG111", f"'{end}' is no input; what takes a value is set: set {end} VALUE")
+            raise _mistake("RG111", f"'{end}' is not an input; to set a value: set {end} VALUE")
         self.set(end, links[0] if len(links) == 1 else list(links))
 
     def disconnect(self, end: str) -> None:
@@ -87,11 +87,11 @@ class PipelineText(Struct, eq=False):
         self.set(end, None)
 
     def set(self, name: str, value: Any) -> None:
-        """Set what `-s` sets, an output of the file or one of its keys, such as `size`; None unsets it."""
+        """Set a path of `-s`, an output of the file or one of its keys, such as `size`; None removes the value."""
         self._set(self._path(name, value), DELETED if value is None else value)
 
     def retype(self, id: str, node_type: str) -> None:
-        """Give a node another type; what this file gives it and the new type has not is dropped."""
+        """Change a node's type; inputs and parameters in this file that the new type lacks are dropped."""
         path, names = self._path(f"{id}.type", node_type), self._names(node_type)
         for part, known in (("inputs", names.inputs), ("params", names.params)):
             for name in sorted({*(_at(self._own(), ("nodes", id, part)) or ())} - known):
@@ -100,20 +100,20 @@ class PipelineText(Struct, eq=False):
         self._set(path, node_type)
 
     def disable(self, id: str) -> None:
-        """Take a node out; nodes that read it read its input instead."""
+        """Disable a node; nodes that read it then read its input instead."""
         self.set(f"{id}.enabled", False)
 
     def enable(self, id: str) -> None:
-        """Put a disabled node back."""
+        """Enable a disabled node."""
         inherited = _at(self._inherited(), ("nodes", id, "enabled")) is False
         self._set(self._path(f"{id}.enabled", True), True if inherited else DELETED)
 
     def insert(self, id: str, node_type: str, end: str, port: str = "", out: str = "") -> None:
-        """Put a new node into the link of an input or of an output of the file, through its ports `port` and `out`."""
+        """Insert a new node into the link of an input or output of the file, through its ports `port` and `out`."""
         path = self._path(end, "node.port")
         link = _at(self._whole(), path)
         if not isinstance(link, str):
-            raise _mistake("RG114", f"'{end}' has no single link that a node could be put into")
+            raise _mistake("RG114", f"'{end}' has no single link into which a node can be inserted")
         if not out:
             port, out = self._passage(node_type)
         self.add(id, node_type, {port: link if "." in link else f"{link}.{path[-1]}"})
@@ -130,7 +130,7 @@ class PipelineText(Struct, eq=False):
         self._set(("views", name), dict(values))
 
     def upgrade(self) -> None:
-        """Rewrite what is spelt as in an earlier version: begin with the version of the format."""
+        """Update the text to the current format: add its version as the first line."""
         if "rendergraph" in self._whole() or "rendergraph" in self._own():
             return
         root = yaml_text.spans(self.text, ())[0]
@@ -184,7 +184,7 @@ class PipelineText(Struct, eq=False):
         return names
 
     def _path(self, name: str, value: Any) -> yaml_text.Path:
-        """Return the place of `node.param` and whatever else `-s` sets, of `outputs.name`, or of a key of the file."""
+        """Return the path of `node.param` or another setting of `-s`, of `outputs.name`, or of a key of the file."""
         id, _, last = name.rpartition(".")
         if id == "outputs" or (not id and name in _FILE_KEYS):
             return ("outputs", last) if id else (name,)
@@ -194,7 +194,7 @@ class PipelineText(Struct, eq=False):
         )
         if problems:
             raise InputError(problems)
-        if patch is None or not patch.mapping:  # `check` says more of it
+        if patch is None or not patch.mapping:  # `check` reports the details
             raise _mistake("RG102", f"the type of node '{id}' does not exist; correct it first: retype {id} TYPE")
         path: yaml_text.Path = ()
         while isinstance(patch.data, dict) and len(path) < (4 if id and last not in ("type", "enabled") else 3):
@@ -213,7 +213,7 @@ class PipelineText(Struct, eq=False):
         raise _mistake("RG112", f"'{node_type}' has no output that continues an input; name both: INPUT OUTPUT")
 
     def _set(self, path: yaml_text.Path, value: Any) -> None:
-        """Set or delete an entry, inherited ones by null; `inputs` and `params` that become empty go, too."""
+        """Set or delete an entry, inherited ones by null; also delete `inputs` and `params` that become empty."""
         if value is DELETED:
             if _at(self._inherited(), path) is not None:
                 value = None

@@ -1,4 +1,4 @@
-"""Old names of the shared includes in a shader's text, replaced by the new ones."""
+"""Replace old names of the shared includes in a shader's text."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rendergraph.resources import folder
 
 
 def upgraded_shader(file: Path, text: str) -> str:
-    """Return a shader's text with the new names in place of those that RG449 warns of; comments stay."""
+    """Return a shader's text with new names for those that RG449 warns about; comments stay."""
     shared = folder("rendergraph.shaders") / "include"
     includes = Includes(shared)
     source = includes.expand(shared / "view.glsl") + includes.expand(file, versions=True)

@@ -1,8 +1,8 @@
-"""YAML text changed in place: one entry is set, deleted or renamed, and every other byte stays as it is.
+"""Edit YAML text in place: set, delete or rename one entry, and keep every other byte.
 
-The places come from PyYAML's events. Only block collections need care: their end mark stands behind the comments that
-follow, so they end where their last value ends. Every change is checked: the new text must hold what the same change
-makes of the old values. Text that cannot be edited here, such as a value that an alias repeats, is refused.
+Places come from PyYAML's events. Only block collections need care: their end mark is after the comments that follow, so
+they end where their last value ends. Every change is verified: the new text must parse to the old values with the same
+change. Text that cannot be edited here, such as a value that an alias repeats, is refused.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from rendergraph.resolve.spec import flow, text_of
 
 Path = tuple[str | int, ...]
 DELETED: Any = object()
-"""In place of a value: there is to be no entry."""
+"""In place of a value: delete the entry."""
 
 BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")
 _COMMA = re.compile(r"(?:\s|(?<=\s)#[^\r\n]*+)*+,")
-_WIDTH = 100  # a new mapping that is longer than this is written in lines, and so are the nodes of a file
+_WIDTH = 100  # longer new mappings, and the nodes of a file, are written in block style
 
 
 def edit(text: str, path: Path, value: Any) -> str:
     """Return the text with a value at a path, or without an entry there if the value is `DELETED`.
 
-    A value replaces the one that is there, or is added behind its neighbours. A deleted entry takes its line with it,
-    or its comma; comments above it stay.
+    A value replaces the existing one, or is added after its siblings. A deleted entry's line or comma goes, too;
+    comments above it stay.
 
     Raises:
-        InputError: (RG019) the values would not be those of the change.
+        InputError: (RG019) the text cannot be edited.
     """
 
     def change(data: Any) -> None:
@@ -62,7 +62,7 @@ def rename(text: str, path: Path, key: str) -> str:
 
     def written(text: str, path: Path, data: Any) -> str:
         span = spans(text, path)[-1]
-        adjacent = re.match(r":\S", text[span.key_end :])  # `{"a":1}`: without quotes the colon would be of the key
+        adjacent = re.match(r":\S", text[span.key_end :])  # `{"a":1}`: the colon would join an unquoted key
         return text[: span.key_start] + (f'"{key}"' if adjacent else text_of(key)) + text[span.key_end :]
 
     return _checked(text, path, change, written)
@@ -76,22 +76,22 @@ def _checked(text: str, path: Path, change: Callable[[Any], None], written: Call
         found = _unshared(parse(after).root.plain())
     except (InputError, LookupError, TypeError, ValueError):
         after, found = "", None
-    if repr(found) != repr(expected):  # also tells 1 from 1.0, and takes nan for nan
-        shared = "; its anchor (&) shares it with another place: write it out there first"
+    if repr(found) != repr(expected):  # distinguishes 1 from 1.0, and nan equals nan
+        shared = "; its anchor (&) is used elsewhere: write the value out there first"
         way = shared if re.search(r"&\w", text) else ": edit it by hand"
         raise InputError(Problem("RG019", f"'{'.'.join(map(str, path))}' cannot be edited where it stands{way}"))
     return after
 
 
 def _unshared(data: Any) -> Any:
-    """Copy what aliases repeat: a change at one place must not reach another."""
+    """Copy data that aliases share: a change at one place must not affect another."""
     if isinstance(data, dict):
         return {key: _unshared(child) for key, child in data.items()}
     return [_unshared(child) for child in data] if isinstance(data, list) else data
 
 
 class Span(Struct, eq=False):
-    """Where a value and its key stand, as offsets into the text; a `block` is a mapping or list in lines."""
+    """Offsets of a value and its key in the text; a `block` is a mapping or list in block style."""
 
     start: int
     end: int
@@ -110,7 +110,7 @@ class Span(Struct, eq=False):
 
 
 def spans(text: str, path: Path) -> list[Span]:
-    """Return the places of the file's value and of the values along a path, as far as they exist."""
+    """Return the spans of the file's value and of the values along a path, as far as they exist."""
     import yaml  # loaded with the first file
 
     parser: Any = parser_of(text)
@@ -157,9 +157,9 @@ def _line(text: str, at: int) -> tuple[int, int, int]:
 
 
 def _lines(text: str, first: int, last: int) -> tuple[int, int]:
-    """Return the range of whole lines from one offset to another; behind a file's last line there may be no break."""
+    """Return the range of whole lines from one offset to another; the last line may have no break."""
     start, (_, end, behind) = _line(text, first)[0], _line(text, last)
-    if BREAK.fullmatch(text[last - 1 : last]):  # a literal that keeps the empty lines behind it
+    if BREAK.fullmatch(text[last - 1 : last]):  # a literal that keeps trailing empty lines
         return start, last
     if end == behind:
         start -= 2 if text.endswith("\r\n", 0, start) else min(start, 1)
@@ -178,7 +178,7 @@ def _set(text: str, path: Path, data: Any) -> str:
 
 def _replace(text: str, span: Span, written: str) -> str:
     colon = text.find(":", span.key_end, span.start) if span.key_start >= 0 else -1
-    if span.start == span.end:  # nothing is written
+    if span.start == span.end:  # the value is empty
         at = colon + 1 or span.end
         return text[:at] + (" " if colon >= 0 else ": ") + written + text[at:]
     if not span.block or colon < 0 or _line(text, span.start)[0] < colon:
@@ -221,7 +221,7 @@ def _entry(key: Any, value: Any, indent: int) -> Iterator[str]:
 
 def _delete(text: str, path: Path, data: Any) -> str:
     *_, span = found = spans(text, path)
-    if len(found) <= len(path):  # below an alias, which is written out
+    if len(found) <= len(path):  # below an alias, whose value is written out
         return _set(text, path, data)
     parent = found[-2]
     children = [*(parent.children or {}).values()]
@@ -230,11 +230,11 @@ def _delete(text: str, path: Path, data: Any) -> str:
         return _replace(text, parent, "{}")
     if parent.block:
         first, behind = _lines(text, span.first, span.last)
-        if text[_line(text, span.first)[0] : span.first].strip(" "):  # beside the dash of a list
+        if text[_line(text, span.first)[0] : span.first].strip(" "):  # on the line of a list's dash
             first, behind = span.first, children[number + 1].first
         return text[:first] + text[behind:]
     if comma := _COMMA.match(text, span.last):
-        gap = re.compile(" *(?! *#)").match(text, comma.end())  # a comment behind the comma keeps its space
+        gap = re.compile(" *(?! *#)").match(text, comma.end())  # a comment after the comma keeps its space
         return text[: span.first] + text[gap.end() if gap else comma.end() :]
     if number == 0:
         return text[: span.first] + text[span.last :]

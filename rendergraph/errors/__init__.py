@@ -110,7 +110,7 @@ class Problem(Struct, frozen=True, eq=False):
 
     @property
     def _compared(self) -> tuple[object, ...]:
-        """Two problems that read the same are one."""
+        """Return what makes two problems equal: everything that is printed."""
         return self.code, self.message, self.place, self.line_text, self.severity
 
     @property
@@ -179,7 +179,7 @@ class Problem(Struct, frozen=True, eq=False):
 
 
 class RendergraphError(Exception):
-    """Base of everything a user can cause; `exit_code` is the command line's."""
+    """Base class of errors that a user can cause; `exit_code` is that of the command line."""
 
     exit_code: ClassVar[int] = 1
 
@@ -188,10 +188,10 @@ class RendergraphError(Exception):
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
     def __reduce__(self) -> tuple[type[RendergraphError], tuple[tuple[Problem, ...]]]:
-        return type(self), (self.problems,)  # to be raised again in another process
+        return type(self), (self.problems,)  # picklable, to be raised again in another process
 
     def _render_traceback_(self) -> list[str]:
-        """What a notebook shows: the message, which has the place of each mistake, and no lines of the framework."""
+        """Return what a notebook shows: the message with the place of each mistake, without lines of the framework."""
         return [f"{type(self).__name__}: {self}"]
 
     def relocated(self, relocate: Callable[[Problem], Problem]) -> Self:
@@ -212,7 +212,7 @@ class RenderError(RendergraphError):
 
 
 class Interruption(BaseException):
-    """A signal ends the program; no handler of errors catches it."""
+    """A signal that ends the program; error handlers do not catch it."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
@@ -220,7 +220,7 @@ class Interruption(BaseException):
 
 
 def is_interruption(error: BaseException) -> bool:
-    """Return whether an exception ends the program, rather than being a fault of the third-party code."""
+    """Return whether an exception ends the program, rather than being an error of third-party code."""
     return isinstance(error, KeyboardInterrupt | Interruption)
 
 
@@ -228,7 +228,7 @@ class Misuse(Exception):
     """A mistake of a node's author, raised while the author's call is on the stack.
 
     The stage that called the node turns it into an `InputError` with the node, the pipeline's line and the author's
-    line, which is `place` where no call is on the stack any more.
+    line, which is `place` if the call is no longer on the stack.
     """
 
     def __init__(self, text: str, code: str = "RG423", place: Place | None = None) -> None:
@@ -283,7 +283,7 @@ def nearest(word: str, words: Iterable[str], *, floor: float = 0.6) -> str | Non
     `difflib` alone misses prefixes (`--env` for `--environment`, `kernal` for `kernel_size`), so a single word with
     that prefix comes first, and words that are similar to one of the tokens count, too.
     """
-    from difflib import get_close_matches  # where something is misspelt alone
+    from difflib import get_close_matches  # only for misspelt words
 
     known = sorted(words)
     lowered = {candidate.lower(): candidate for candidate in reversed(known)}

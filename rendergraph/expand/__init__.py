@@ -1,7 +1,7 @@
-"""Graph to Expansion: what each node records, with resources and versions in place of ports.
+"""Expand a Graph into the steps that nodes record, with resources and versions in place of ports.
 
-Nodes are recorded from the end of the graph to its beginning, so that a node already knows which of its outputs
-anybody reads; then versions are counted from the beginning to the end.
+Nodes are recorded in reverse topological order, so that a node already knows which of its outputs are read; versions
+are then counted in topological order.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def _finalize(graph: Graph, found: VersionedSteps, outputs: Mapping[str, Endpoin
         shown[name] = resource
         if version == found.newest[resource]:
             continue
-        shown[name] = f"{end} kept"  # what a tap in the middle of a chain shows is copied
+        shown[name] = f"{end} kept"  # an intermediate version is copied
         if shown[name] not in resources:
             resources[shown[name]] = replace(resources[resource], id=shown[name], role="output")
             steps.append(_copy(name, end, resource, version, steps))
@@ -63,10 +63,10 @@ def _copy(name: str, end: Endpoint, resource: str, version: int, steps: list[Ste
 def _mark_roles(
     graph: Graph, found: VersionedSteps, shown: Mapping[str, str], steps: list[Step], resources: dict[str, Resource]
 ) -> None:
-    """Outputs, and resources that outlive the frame, are never shared."""
+    """Mark outputs, and resources that outlive the frame: they never share memory."""
     previous = {read.resource for step in steps for read in step.all_reads if read.previous}
     for end in graph.textures:
-        if str(end) in previous and str(end) not in resources:  # its node is idle: it stays as it first was
+        if str(end) in previous and str(end) not in resources:  # its node is idle, so it keeps its first value
             port, info = graph[end.node].node.ports()[end.port], graph.textures[end]
             assert isinstance(port, WrittenPort)
             first = port.first or 0.0
@@ -79,9 +79,9 @@ def _mark_roles(
 
 
 def _check_kept(steps: Sequence[Step], resources: Mapping[str, Resource]) -> None:
-    """Check that steps which write kept resources depend on nothing that changes from frame to frame (RG439).
+    """Check that steps that write kept resources depend on nothing that changes from frame to frame (RG439).
 
-    What their shaders read besides is checked where program text is assembled.
+    Other values that their shaders read are checked when the program text is assembled.
     """
     problems = [
         step.problem("RG439", text)
@@ -109,6 +109,6 @@ def _dependencies(step: Step, made: Sequence[str], resources: Mapping[str, Resou
         yield f"it makes '{kept}', which is kept, in a region that `update` sets in each frame"
     for read in step.all_reads:
         if read.previous:
-            yield f"it makes '{kept}', which is kept, from last frame's '{read.resource}', another in each frame"
+            yield f"it makes '{kept}', which is kept, from last frame's '{read.resource}', which changes every frame"
         elif read.resource not in resources or resources[read.resource].role not in ("kept", "scene"):
             yield f"it makes '{kept}', which is kept, from '{read.resource}', which is not; keep that too: `kept=True`"

@@ -1,4 +1,4 @@
-"""What expanding yields: steps, resources and view tables."""
+"""The result of expanding: steps, resources and view tables."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ OF_SCENE: Mapping[Semantic | Signature, Endpoint] = {
     EnvironmentMap: Endpoint("", "the scene's environment"),
     SceneData: SCENE_DATA,
 }
-"""What an input that reads the scene is linked to where the file links it to nothing."""
+"""The sources of inputs that read the scene, if the file does not link them."""
 
 
 class ViewTable(Struct, frozen=True):
-    """A table of views: how many, and each one's light index in the scene (empty where views are not lights')."""
+    """A table of views: their count, and each view's light index in the scene (empty unless they are lights' views)."""
 
     count: int = 1
     lights: tuple[int, ...] = ()
@@ -32,9 +32,9 @@ class VersionedSteps(Struct, frozen=True):
 
     Attributes:
         newest: resource id to its last version.
-        final: port to its resource and the version it has when its node is done.
+        final: port to its resource and the resource's version after its node.
         forwarded: port of an idle node to the port that it would continue.
-        firsts: resource id to the value in the first frame that a node which continues it declares.
+        firsts: resource id to the first frame's value, if a node that continues it declares one.
     """
 
     steps: Sequence[Step]

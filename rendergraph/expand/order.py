@@ -1,4 +1,4 @@
-"""Which recorded step comes before which, where nodes form a cycle: steps are what is scheduled, not nodes."""
+"""Order recorded steps if nodes form a cycle: steps, not nodes, are scheduled."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from rendergraph.link.graph import upstream_first
 
 _Step: TypeAlias = tuple[str, int]
 _Cause: TypeAlias = tuple[str, str, Endpoint]
-"""Why a step waits for another: the node that reads, its input or port, and what that is linked to."""
+"""Why a step waits for another: the reading node, its input or port, and the source of the link."""
 
 
 def step_order(
     graph: Graph, recordings: Mapping[str, Recording], forwarded: Mapping[Endpoint, Endpoint]
 ) -> list[_Step]:
-    """Return node and number of every recorded step behind those whose results it needs; RG117 if there is a cycle."""
+    """Return node and number of every recorded step in topological order; raise RG117 if there is a cycle."""
     order = _StepOrder(graph, recordings, forwarded)
     waits = {(name, number): order.waits(name, number) for name in recordings for number in order.numbers(name)}
     found = upstream_first(waits)
@@ -46,7 +46,7 @@ class _StepOrder:
         return range(len(self.recordings[name].requests))
 
     def waits(self, name: str, number: int) -> dict[_Step, _Cause]:
-        """Return the steps that one waits for, each with a cause."""
+        """Return the steps that a step waits for, each with a cause."""
         found: dict[_Step, _Cause] = {}
         recording = self.recordings[name]
         request = recording.requests[number]
@@ -55,7 +55,7 @@ class _StepOrder:
             if not (isinstance(target, Part) and target.previous):
                 for key, cause in self._before(name, target, number):
                     found.setdefault(key, cause)
-        for earlier in range(number):  # reads what this step writes over
+        for earlier in range(number):  # reads a version that this step overwrites
             for target in recording.requests[earlier].reads:
                 port = target.port if isinstance(target, Part) else target
                 if port.name in written and not (isinstance(target, Part) and target.previous):
@@ -64,7 +64,7 @@ class _StepOrder:
         return found
 
     def _before(self, name: str, target: Port | Part, number: int | None) -> Iterator[tuple[_Step, _Cause]]:
-        """Yield the steps that decide what a port holds for step `number` of its node; None behind all its steps."""
+        """Yield the steps that decide what a port holds before step `number` of its node; None: after all steps."""
         port, only = (target.port, target.link) if isinstance(target, Part) else (target, None)
         own = Endpoint(name, port.name)
         if isinstance(port, Function):
@@ -86,7 +86,7 @@ class _StepOrder:
 
     def cycle(self, waits: Mapping[_Step, Mapping[_Step, _Cause]]) -> Problem:
         """Return the problem of one cycle, with its steps, nodes and links."""
-        from graphlib import CycleError, TopologicalSorter  # to name a cycle where there is one
+        from graphlib import CycleError, TopologicalSorter  # only to name a cycle
 
         steps: list[_Step] = []
         try:
@@ -104,7 +104,7 @@ class _StepOrder:
         if len(hops) > 6:
             hops[3:-2] = ["…"]
         every = [key for _, key in pairwise(steps) if self.recordings[key[0]].requests[key[1]].reads_all]
-        way = "'@previous' behind one reads last frame's value"
+        way = "append '@previous' to a link to read last frame's value"
         if every:
             way = f"{self._name(every[0])} names no input, so it reads all: name in `record` what it reads; or {way}"
         text = f"the steps form a cycle: {', '.join(hops)}; {way}"

@@ -1,4 +1,4 @@
-"""First pass: every node that is needed records its requests, the last ones first."""
+"""First pass: every node that is needed records its requests, in reverse order."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from rendergraph.steps import MOST_STEPS, StepRequest, Steps, UniformValue, defi
 from rendergraph.textures import BufferDesc, TextureDesc
 
 _MOST_REQUESTS = 10 * MOST_STEPS
-"""Of one node, which might record without end; so many are told before they take all memory."""
+"""Maximum number of steps of one node, which might record endlessly."""
 
 
 class Recording:
     """The `steps.Recorder` of one node.
 
     Attributes:
-        unfilled: selections of objects it draws that are empty in this scene; left out where that changes nothing.
+        unfilled: empty selections of objects that it would draw, if skipping them changes nothing.
         links: connected inputs whose textures have layers; those to `OF_SCENE` stand for the scene's.
     """
 
@@ -79,7 +79,7 @@ class Recording:
         return needs(self.node.choices[parameter]) if parameter in self.node.choices else ()
 
     def reads(self, out: Iterable[Part]) -> Mapping[str, Port]:
-        """The inputs of a step that names none: all connected ones; only kept ones if it writes a kept port."""
+        """Return the inputs of a step that names none: all connected ones; only kept ones if it writes a kept port."""
         connected = {name: port for name, port in self.node.type.read.items() if self.links.get(name)}
         if any(is_kept(part.port) for part in out):
             return {name: port for name, port in connected.items() if all(map(self._lasts, self.links[name]))}
@@ -129,7 +129,7 @@ class Recording:
         return isinstance(port, InOut) and bool(self.links.get(port.name))
 
     def demands(self) -> list[Endpoint]:
-        """The ports of other nodes that the recorded steps and the used functions read."""
+        """Return the ports of other nodes that the recorded steps and the used functions read."""
         ports = self.node.node.ports()
         names: set[str] = set()
         for request in self.requests:
@@ -166,11 +166,11 @@ def record_all(
         recordings, idle = _record(graph, order, outputs, history_readers, {})
         if not history_readers & idle.keys():
             return recordings, idle
-        history_readers -= idle.keys()  # whoever does nothing does not read last frame's values either
+        history_readers -= idle.keys()  # idle nodes do not read last frame's values either
 
 
 def _history_readers(graph: Graph, outputs: Mapping[str, Endpoint]) -> set[str]:
-    """Nodes that read last frame's values and contribute to an output."""
+    """Return the nodes that read last frame's values and contribute to an output."""
     history_readers = {node.id for node in graph.nodes for ends in node.inputs.values() for end in ends if end.previous}
     reached: set[str] = set()
     stack = [end.node for end in outputs.values()] if history_readers else []
@@ -189,9 +189,9 @@ def _record(
     history_readers: set[str],
     demanded_before: Mapping[str, set[str]],
 ) -> tuple[dict[str, Recording], dict[str, str]]:
-    """`history_readers` may come earlier in the order than the nodes whose last values they read.
+    """Record nodes in reverse order; `history_readers` may precede the nodes whose last values they read.
 
-    Where nodes form a cycle one may be recorded before all of its readers are: `demanded_before` tells what they read.
+    In a cycle of nodes, a node may be recorded before some of its readers: `demanded_before` has what they read.
     """
     demanded: dict[str, set[str]] = {name: set(demanded_before.get(name, ())) for name in order}
     told: dict[str, int] = {}
@@ -204,7 +204,7 @@ def _record(
                     demanded[end.node].add(end.port)
     recordings: dict[str, Recording] = {}
     idle: dict[str, str] = {}
-    reached: set[str] = set()  # nodes that are demanded, and those that would be if what they make had layers
+    reached: set[str] = set()  # nodes that are demanded, and those that would be if their textures had layers
     for name in reversed(order):
         node = graph[name]
         used = demanded[name]
@@ -221,10 +221,10 @@ def _record(
         recording = Recording(graph, node, used)
         steps = Steps(node.node.ports(), name, node.type.name, recording)
         try:
-            _returns_nothing(node.node.record(steps))  # type: ignore[func-returns-value]  # a stranger's may
+            _returns_nothing(node.node.record(steps))  # type: ignore[func-returns-value]  # third-party nodes may
         except InputError:
             raise
-        except BaseException as error:  # whatever a stranger's node raises is a mistake in that node
+        except BaseException as error:  # anything that a node raises is its mistake
             if is_interruption(error):
                 raise
             raise InputError(_author_problem(node, error)) from error
@@ -290,12 +290,12 @@ def _why_idle(graph: Graph, node: GraphNode, used: set[str]) -> str | None:
 
 
 def _returns_nothing(value: object) -> None:
-    """A `record` with `yield` or `async` in it has not run at all."""
+    """Refuse a `record` that returns something: with `yield` or `async` in it, it has not run at all."""
     if value is not None:
         close = getattr(value, "close", None)
         if callable(close):
             close()
-        raise Misuse(f"`record` gives back a {type(value).__name__}; it calls steps.… and returns nothing")
+        raise Misuse(f"`record` returned a {type(value).__name__}; it must call steps.… and return nothing")
 
 
 def _author_problem(node: GraphNode, error: BaseException) -> Problem:

@@ -1,4 +1,4 @@
-"""What a step writes to: which parts, at which size, and what it must not read meanwhile."""
+"""The targets of a step: their parts and size, and what the step must not read."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rendergraph.textures import FORMATS, BufferDesc, TextureDesc
 
 
 def parts_written(request: StepRequest, part: Part, desc: TextureDesc | BufferDesc) -> set[tuple[int, int | None]]:
-    """Return the (mip, layer) pairs a request writes: a clear the whole texture, a mip chain all but mip 0."""
+    """Return the (mip, layer) pairs that a request writes: all for a clear, all but mip 0 for a mip chain."""
     mips = desc.mips if isinstance(desc, TextureDesc) else 1
     if request.kind == "mipmaps":
         return {(mip, None) for mip in range(1, mips)}
@@ -27,7 +27,7 @@ def overlap(one: tuple[int, int | None], other: tuple[int, int | None]) -> bool:
 def refusals(
     request: StepRequest, resources: Mapping[str, Resource], writes: Sequence[Write], reads: Sequence[Read]
 ) -> Iterator[tuple[str, str]]:
-    """Yield code and text of what a step must not draw to, or read while it draws."""
+    """Yield code and text of each invalid target, and of each read that conflicts with a target."""
     for write in writes:
         yield from _feedback(request, write, reads)
     for read in reads:
@@ -45,7 +45,7 @@ def refusals(
 
 
 def _feedback(request: StepRequest, write: Write, reads: Iterable[Read]) -> Iterator[tuple[str, str]]:
-    """A step must not sample what it writes: drivers return old texels, new ones, or a mixture."""
+    """Check that a step does not sample what it writes: drivers return old texels, new ones, or a mixture."""
     state = request.options.get("state")
     if write.use == "depth" and state is not None and state.depth_write is False:
         return
@@ -75,7 +75,7 @@ def target_size(
 def _mismatches(
     resources: Mapping[str, Resource], writes: Sequence[Write], reads: Iterable[Read]
 ) -> Iterator[tuple[str, str]]:
-    """Attachments of one draw must fit together in size, samples and layers, with one depth target."""
+    """Check that the attachments of a draw agree in size, samples and layers, with at most one depth target."""
     attached: list[Read | Write] = [write for write in writes if write.use in ("color", "depth")]
     attached += [read for read in reads if read.use == "depth_test"]
     first: tuple[str, _Extent] | None = None
@@ -100,7 +100,7 @@ def _mismatches(
 
 
 def _undefined_destinations(request: StepRequest, writes: Iterable[Write]) -> Iterator[tuple[str, str]]:
-    """Targets that a draw blends onto, or tests against, while their contents are undefined."""
+    """Check that a draw does not blend onto, or test against, targets with undefined contents."""
     state = request.options.get("state")
     if not isinstance(state, State) or request.kind not in ("fullscreen", "geometry", "draw"):
         return

@@ -1,4 +1,4 @@
-"""Second pass: resources and versions in place of the ports that nodes recorded."""
+"""Second pass: replace the ports that nodes recorded by resources and versions."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _COPIED_OPTIONS = frozenset(
     label state region objects materials order in_place per_light topology command commands invocations
     """.split()  # noqa: SIM905 - a list of so many words reads best as text
 )
-"""Options of a request that a step has as they are."""
+"""Options of a request that are copied to the step."""
 _PLAIN = Sampler()
 
 
@@ -41,7 +41,7 @@ def assign_versions(graph: Graph, recordings: Mapping[str, Recording], idle: Map
 
 
 class _VersionAssignment:
-    """`version` is each resource's newest; `written` its written parts: mip, and layer or None for all."""
+    """`version` is each resource's newest version; `written` has its written parts: mip, and layer or None for all."""
 
     def __init__(self, graph: Graph, recordings: Mapping[str, Recording], idle: Mapping[str, str]) -> None:
         self.graph = graph
@@ -104,7 +104,7 @@ class _VersionAssignment:
             self.idle[recording.node.id] = "it recorded no step"
 
     def _by_step(self) -> None:
-        """The same where nodes form a cycle: the steps of one stand before and behind those of others."""
+        """Assign versions if nodes form a cycle: steps of one node run before and after those of others."""
         from rendergraph.expand.order import step_order  # few pipelines have one
 
         for recording in self.recordings.values():
@@ -118,7 +118,7 @@ class _VersionAssignment:
                 self._final(end)
 
     def _final(self, end: Endpoint) -> tuple[str, int] | None:
-        """Return the resource of a port and the version that it has by now."""
+        """Return the resource of a port and its current version."""
         found = self.final.get(end)
         if found is None and self.graph.cyclic and end.node in self.recordings:
             links = self.recordings[end.node].links.get(end.port)
@@ -129,7 +129,7 @@ class _VersionAssignment:
         return found
 
     def _declare(self, recording: Recording) -> None:
-        """Create a resource for every texture the node may write; an `InOut` continues an existing one."""
+        """Create a resource for every texture that the node may write; an `InOut` continues an existing one."""
         node = recording.node
         for name in node.type.views:
             end = Endpoint(node.id, name)
@@ -142,8 +142,8 @@ class _VersionAssignment:
             if isinstance(made, InOut) and recording.links.get(name):
                 before = follow_forwards(self.forwarded, recording.links[name][0])
                 if self.graph.cyclic:
-                    continue  # until a step needs it: what it continues is not written yet
-                if before in self.final:  # else nothing that runs touches it, here or where it comes from
+                    continue  # deferred until a step needs it: its source is not written yet
+                if before in self.final:  # otherwise no step that runs touches it
                     self.final[end] = self.final[before]
                 continue
             info = self.graph.textures[end]
@@ -187,7 +187,7 @@ class _VersionAssignment:
             writes.append(write)
         all_reads = [*reads, *[read for f in functions for read in f.reads]]
         for code, text in refusals(request, self.resources, writes, all_reads):
-            raise self._refused(recording, request, code, text)  # while the author's call is still known
+            raise self._refused(recording, request, code, text)  # while the author's call is known
         view, view_index = self._view(recording, request, options)
         self._carry_view(writes, view if request.kind == "geometry" else None)
         size, samples = target_size(self.resources, writes, reads)
@@ -250,8 +250,8 @@ class _VersionAssignment:
         resource, final = self._final(follow_forwards(self.forwarded, end)) or (str(self._maker(end)), 0)
         port = self.graph[end.node].node.ports()[end.port] if end.previous else None
         if isinstance(port, InOut) and port.first is not None:
-            self.firsts[resource] = port.first  # said where the texture is continued, and read from there
-        # Else last frame's value of a node further down.
+            self.firsts[resource] = port.first  # declared by the node that continues the texture
+        # If `known` is None, this is last frame's value of a later node.
         known = self.resources.get(resource)
         desc = known.desc if known is not None else self.graph.textures[end.now].storage
         if isinstance(desc, BufferDesc):
@@ -264,7 +264,7 @@ class _VersionAssignment:
         self, recording: Recording, request: StepRequest, name: str, part: Part, value: Any
     ) -> tuple[list[Read], Write]:
         port = part.port
-        assert isinstance(port, WrittenPort)  # `steps` has seen to that
+        assert isinstance(port, WrittenPort)  # checked by `steps`
         end = recording.own[port.name]
         found = self._final(end)
         if found is None:
@@ -341,7 +341,7 @@ class _VersionAssignment:
     def _function(self, end: Endpoint) -> list[FunctionBinding]:
         recording = self.recordings.get(end.node)
         if recording is None:
-            return []  # it has nothing to read: the consumer's function is then neutral
+            return []  # it has nothing to read, so the consumer's function is neutral
         port = recording.node.node.ports()[end.port]
         assert isinstance(port, Function)
         return [self._binding(recording, port)]
@@ -356,7 +356,7 @@ class _VersionAssignment:
                 continue
             if name in recording.own and recording.own[name] in self.graph.empty:
                 continue
-            updates = type(node.node).update is not Node.update  # which may fill a buffer
+            updates = type(node.node).update is not Node.update  # `update` may fill a buffer
             filled = isinstance(source, Internal) and source.kind == "buffer" and updates
             if isinstance(source, Internal) and not filled and not self.written[self.final[recording.own[name]][0]]:
                 continue
@@ -401,7 +401,7 @@ def _condition_step(recording: Recording, label: str, index: int) -> int | None:
 
 
 def _forwarded_ports(graph: Graph, recordings: Mapping[str, Recording]) -> Iterator[tuple[Endpoint, Endpoint]]:
-    """Map ports of idle nodes to the inputs they would continue: without the node the texture is unchanged."""
+    """Map ports of idle nodes to the inputs that they would continue: without the node, the texture is unchanged."""
     for node in graph.nodes:
         for name, port in node.node.ports().items() if node.id not in recordings else ():
             if isinstance(port, InOut) and node.inputs.get(name):

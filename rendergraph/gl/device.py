@@ -101,11 +101,11 @@ class Device(Struct, eq=False, dict=True):
 
     @cached_property
     def stores_blocks(self) -> bool:
-        """Whether a stage may use few uniform blocks, as on zink over the lavapipe of Mesa before 24.
+        """Whether a stage may use only few uniform blocks, as on zink over the lavapipe of Mesa before 24.
 
-        To compile branches on uniforms away, that driver notes their offsets in a table with 4 places a block, but
-        counts 32 a block. It numbers push constants 0 and uniforms without a block 1; the notes on block 4 end up
-        beyond the table, and the next draw crashes.
+        To eliminate branches on uniforms, that driver records their offsets in a table with 4 entries per block, but
+        indexes it with 32 per block. It numbers push constants 0 and uniforms without a block 1; entries of block 4
+        lie beyond the table, and the next draw crashes.
         """
         version = re.search(r"Mesa (\d+)", str(self.ctx.info["GL_VERSION"]))
         return self.renderer.startswith("zink (llvmpipe") and version is not None and int(version[1]) < 24
@@ -136,10 +136,10 @@ class Device(Struct, eq=False, dict=True):
             self.ctx.release()
 
     def _make_not_current(self) -> None:
-        """Make no context current where this one is, which `current` leaves so if there was none before.
+        """Make no context current if this one is current, as `current` leaves it if there was none before.
 
-        A driver may give a new context the handle of a destroyed one. GLVND skips making a handle current that it
-        takes for current, and what is drawn then goes nowhere.
+        A driver may reuse the handle of a destroyed context. GLVND skips making a handle current that it considers
+        current, and draws are then lost.
         """
         egl = _egl()
         if egl is None or not (before := egl.eglGetCurrentContext()):
@@ -160,7 +160,7 @@ def open_device(index: int | None = None) -> Device:
     """Open a headless context on the machine's GL device.
 
     Args:
-        index: EGL device number as `doctor` lists them; None for the default, or RENDERGRAPH_DEVICE where set.
+        index: EGL device number as listed by `doctor`; None for RENDERGRAPH_DEVICE, or else the default.
     """
     if first_process() != os.getpid():
         text = (
@@ -177,7 +177,7 @@ def open_device(index: int | None = None) -> Device:
         with previous_context():
             from glcontext import egl  # type: ignore[import-untyped]  # ships no types
 
-            # By their names, which every Linux has: glcontext's own search starts two processes.
+            # Name the libraries, because glcontext's own search starts two processes.
             names = {
                 "libgl": os.environ.get("GLCONTEXT_LINUX_LIBGL") or "libGL.so.1",
                 "libegl": os.environ.get("GLCONTEXT_LINUX_LIBEGL") or EGL,
@@ -187,7 +187,7 @@ def open_device(index: int | None = None) -> Device:
             return _wrap(ctx, context.load, owned=True)
     except DeviceError:
         raise
-    except Exception as error:  # glcontext raises bare Exception, with a different text a cause
+    except Exception as error:  # glcontext raises plain Exception, with a different text for each cause
         text = f"no usable OpenGL 4.5 device: {error}; `rendergraph doctor` says what to install"
         raise DeviceError(Problem("RG611", text)) from error
 
@@ -213,7 +213,7 @@ def previous_context() -> Iterator[None]:
 
 @cache
 def _egl() -> Any:
-    """Return the functions about current contexts, None without EGL."""
+    """Return EGL's functions for current contexts; None without EGL."""
     try:
         egl = ctypes.CDLL(EGL)
     except OSError:
@@ -252,7 +252,7 @@ def _wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
         "samples": raw.integer(0x910E),  # of colour textures
         "depth_samples": raw.integer(0x910F),
         "integer_samples": raw.integer(0x9110),
-        "anisotropy": raw.integer(0x84FF),  # 0 where the driver has no such filter
+        "anisotropy": raw.integer(0x84FF),  # 0 if the driver does not support it
         "color_targets": min(raw.integer(0x8CDF), raw.integer(0x8824)),  # attachments, draw buffers
         "images": raw.integer(0x8F38),
         "storage_bindings": raw.integer(0x90DD),

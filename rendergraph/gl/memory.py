@@ -1,4 +1,4 @@
-"""How much memory a plan may use: what the driver reports as free on the device, or what the machine has."""
+"""Limit the memory of a plan to what the driver reports as free on the device, or to what the machine has."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ _NVX_CURRENT_AVAILABLE, _ATI_TEXTURE_FREE = 0x9049, 0x87FC
 
 
 def check_memory(device: Device, needed: int, allowed: int | None = None) -> None:
-    """Refuse a plan before the driver is asked: some drivers end the process where others return an error.
+    """Refuse a plan before allocating it: some drivers end the process where others return an error.
 
     Args:
         needed: bytes.
-        allowed: MiB; by default RENDERGRAPH_MEMORY_LIMIT, else three quarters of what is free on the device.
+        allowed: MiB; by default RENDERGRAPH_MEMORY_LIMIT, else three quarters of the device's free memory.
     """
     named = os.environ.get(VARIABLE, "")
     if allowed is None and named:
@@ -50,7 +50,7 @@ def free_on_device(device: Device) -> int | None:
         ("GL_ATI_meminfo", _ATI_TEXTURE_FREE),
     ):
         if extension in device.ctx.extensions:
-            kibibytes = (ctypes.c_int * 4)()  # the second answers with four numbers, of which the first is the total
+            kibibytes = (ctypes.c_int * 4)()  # the second query returns four numbers, the total first
             device.raw.glGetIntegerv(parameter, ctypes.byref(kibibytes))
             if kibibytes[0] > 0:
                 return kibibytes[0] * 1024

@@ -1,4 +1,4 @@
-"""Blocks of memory that textures of any description lie in (GL_EXT_memory_object_fd).
+"""Blocks of memory shared by textures of any description (GL_EXT_memory_object_fd).
 
 Textures in a block overwrite each other: one may be written only when no command that uses another is running. OpenGL
 imports the memory as a file descriptor; Vulkan 1.1 allocates and exports it. Its structures are packed by hand, as each
@@ -45,7 +45,7 @@ class MemoryBlock(Struct, eq=False):
 def make_blocks(device: Device, groups: Sequence[Sequence[TextureDesc]]) -> list[MemoryBlock]:
     """Return a block for each list of descriptions, as large as its largest texture is on this device."""
     blocks: list[MemoryBlock] = []
-    allocated: list[tuple[int, int]] = []  # bytes and file descriptors that are not imported yet
+    allocated: list[tuple[int, int]] = []  # bytes and file descriptors that have not been imported
     if not groups:
         return blocks
     try:
@@ -104,7 +104,7 @@ _COLOR_USES, _DEPTH_USES = 0x1 | 0x2 | 0x4 | 0x10, 0x1 | 0x2 | 0x4 | 0x20
 
 
 class NoMemoryObjects(Exception):
-    """Vulkan is missing, or does not have the device that OpenGL draws on."""
+    """Vulkan is missing, or does not offer the device that OpenGL uses."""
 
 
 class Vulkan:
@@ -188,7 +188,7 @@ def _same_device(library: Any, instance: Any, identity: bytes) -> Any:
         library.vkGetPhysicalDeviceProperties2(ctypes.c_void_p(handle), properties)
         if names.raw[16:32] == identity:
             return ctypes.c_void_p(handle)
-    raise NoMemoryObjects("Vulkan does not have the device that OpenGL draws on")
+    raise NoMemoryObjects("Vulkan does not offer the device that OpenGL uses")
 
 
 @contextmanager

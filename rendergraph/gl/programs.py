@@ -1,7 +1,7 @@
-"""Programs: compiled through moderngl, looked into and written to by raw calls.
+"""Programs: compiled through moderngl; queried and set by raw calls.
 
-moderngl knows no shadow-array samplers and rebinds storage blocks wrongly, so the active interface is read from the
-driver and written by location.
+moderngl does not know samplers of shadow arrays and rebinds storage blocks wrongly, so the active interface is queried
+from the driver, and uniforms are written by location.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ class Program(Struct, eq=False):
 def link(
     device: Device, texts: Mapping[str, str], outputs: Sequence[str] = (), stored: Collection[str] = ()
 ) -> Program:
-    """Compile and link the stages; fragment outputs go to the locations of their order in `outputs`.
+    """Compile and link the stages; fragment outputs get locations in the order of `outputs`.
 
     Uniform blocks named in `stored` become storage blocks.
 
@@ -171,7 +171,7 @@ def link(
 
 
 def _in_storage(text: str, blocks: Collection[str]) -> str:
-    """Return a text with some of its uniform blocks as storage blocks, whose members lie where they did."""
+    """Return a text with some of its uniform blocks as storage blocks with the same member offsets."""
     return UNIFORM_BLOCK.sub(lambda m: f"layout(std430) readonly buffer {m[1]}" if m[1] in blocks else m[0], text)
 
 

@@ -1,4 +1,4 @@
-"""Queries around leaf steps, as OpenGL nests none: time on the device, and whether anything was drawn."""
+"""Queries around single steps, because OpenGL does not nest them: time, and whether anything was drawn."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class _Query(Struct, eq=False):
     target: ClassVar[int]
 
     device: Device
-    _glo: int = 0  # made when the query is first started
+    _glo: int = 0  # created when the query is first started
     _started: bool = False
 
     def start(self) -> None:
@@ -43,7 +43,7 @@ class Timer(_Query):
     target = TIME_ELAPSED
 
     def milliseconds(self) -> float | None:
-        """Return the time, None where the driver does not know; waits for the device."""
+        """Return the time, or None if the driver has no answer; waits for the device."""
         nanoseconds = ctypes.c_uint64()
         self.device.raw.glGetQueryObjectui64v(self._glo, _QUERY_RESULT, ctypes.byref(nanoseconds))
         return None if nanoseconds.value >= _NO_ANSWER else nanoseconds.value * 1e-6
@@ -57,7 +57,7 @@ class OcclusionQuery(_Query):
     _conditional: bool = False
 
     def begin_conditional(self) -> None:
-        """Skip what is drawn from here on if no sample passed."""
+        """Skip the following draws if no sample passed."""
         self.device.raw.glBeginConditionalRender(self._glo, _QUERY_WAIT)
         self._conditional = True
 
@@ -66,7 +66,7 @@ class OcclusionQuery(_Query):
         self._conditional = False
 
     def abort(self) -> None:
-        """End what is under way, if anything is: a step was interrupted, and others are drawn after it."""
+        """End an active query or condition after a step was interrupted, because others are drawn later."""
         if self._started:
             self.stop()
         if self._conditional:

@@ -1,4 +1,4 @@
-"""The OpenGL functions moderngl does not offer, as a small table over the driver's own loader.
+"""The OpenGL functions that moderngl lacks, as a small table over the driver's own loader.
 
 PyOpenGL would do the same at 0.13 s of import time; these prototypes take well under a millisecond.
 """
@@ -27,7 +27,7 @@ _ERRORS = {
 class RawGL:
     """Raw functions by name, without moderngl's checks: `raw.glDepthFunc(0x0203)`.
 
-    A function the driver lacks raises AttributeError on first use.
+    A function that the driver lacks raises AttributeError on first use.
     """
 
     def __init__(self, load: Callable[[str], int]) -> None:
@@ -44,7 +44,7 @@ class RawGL:
         return function
 
     def make(self, function: str, *arguments: int) -> int:
-        """Return the one name that a `glCreate…` or `glGen…` function makes."""
+        """Return one new name from a `glCreate…` or `glGen…` function."""
         name = ctypes.c_uint()
         getattr(self, function)(*arguments, 1, ctypes.byref(name))
         return name.value

@@ -1,7 +1,7 @@
-"""The GL state that no step sets: set to what every frame needs, and restored on a borrowed context.
+"""The GL state that no step sets: set once to what frames need, and restored on a borrowed context.
 
-One table says how each piece of OpenGL's state is read, how it is set, and which value frames need. `settle` sets these
-values; `SavedState` saves all that drawing changes and restores it.
+A table lists for each piece of OpenGL's state how it is queried, how it is set, and which value frames need. `settle`
+sets these values; `SavedState` saves and restores all state that rendering changes.
 """
 
 from __future__ import annotations
@@ -111,11 +111,11 @@ STATE_CALLS: tuple[StateCall, ...] = (
     StateCall("glStencilOpSeparate", _each(0x8801, 0x8802, 0x8803), (_BACK,)),
     StateCall("glStencilMaskSeparate", _each(0x0B98), (_FRONT,)),
     StateCall("glStencilMaskSeparate", _each(0x8CA5), (_BACK,)),
-    # how texels travel: bytes swapped, first bit, row length, rows, texels, images skipped, image height; alignment
+    # pixel transfer: swapped bytes, first bit, row length, skipped rows, texels and images, image height; alignment
     *_pixel_store(0x0CF0, 0x0CF1, 0x0CF2, 0x0CF3, 0x0CF4, 0x806D, 0x806E),
     *_pixel_store(0x0D00, 0x0D01, 0x0D02, 0x0D03, 0x0D04, 0x806B, 0x806C),
     *_pixel_store(0x0CF5, 0x0D05, needed=1),
-    # what is bound
+    # bindings
     _buffer(0x8892, 0x8894),  # ARRAY
     _buffer(0x8F36, 0x8F36),  # COPY_READ
     _buffer(0x8F37, 0x8F37),  # COPY_WRITE
@@ -138,13 +138,13 @@ _BLOCKS = (
     (0x8A11, 0x8A2F, (0x8A28, 0x8A29, 0x8A2A)),  # UNIFORM_BUFFER
     (0x90D2, 0x90DD, (0x90D3, 0x90D4, 0x90D5)),  # SHADER_STORAGE_BUFFER
 )
-"""Target, number of binding points; parameters for the buffer, its start and its size at each."""
+"""Target, number of binding points, and the parameters for buffer, start and size at each."""
 
 _TEXTURES = {
     0x0DE0: 0x8068, 0x0DE1: 0x8069, 0x806F: 0x806A, 0x8C18: 0x8C1C, 0x8C1A: 0x8C1D, 0x84F5: 0x84F6, 0x8513: 0x8514,
     0x9009: 0x900A, 0x8C2A: 0x8C2C, 0x9100: 0x9104, 0x9102: 0x9105,
 }  # fmt: skip
-"""Texture target to the parameter that says what is bound to it."""
+"""Texture target to the parameter that queries its binding."""
 
 _READERS: dict[tuple[str, bool], tuple[str, Any]] = {
     ("i", False): ("glGetIntegerv", ctypes.c_int),
@@ -167,21 +167,21 @@ def settle(raw: RawGL) -> None:
 
 
 class SavedState:
-    """A borrowed context's state as its owner left it.
+    """The state of a borrowed context as its owner left it.
 
-    Not saved, since drawing does not touch it: program pipelines, tessellation, all hints but one, clear values, atomic
-    counters, debug output. A query that the owner has begun also counts what is drawn meanwhile.
+    Not saved, because rendering does not change it: program pipelines, tessellation, all hints but one, clear values,
+    atomic counters, debug output. An active query of the owner also counts what is drawn meanwhile.
     """
 
     def __init__(self, raw: RawGL, ctx: moderngl.Context) -> None:
         """Read everything and pause an active transform feedback."""
         self._raw, self._ctx = raw, ctx
-        raw.error()  # an error of the owner's must not be taken for ours
+        raw.error()  # discard errors of the owner
         _refuse_conditional(raw)
         self._feedback = bool(raw.integer(_FEEDBACK_ACTIVE)) and not raw.integer(_FEEDBACK_PAUSED)
         if self._feedback:
             raw.glPauseTransformFeedback()
-        self._framebuffer = ctx.fbo, ctx.mglo.fbo  # moderngl binds again what it believes bound
+        self._framebuffer = ctx.fbo, ctx.mglo.fbo  # moderngl rebinds what it considers bound
         self.enabled = [(capability, raw.glIsEnabled(capability)) for capability in (*NEEDED, *_STATED)]
         self.indexed = [
             (capability, index, raw.glIsEnabledi(capability, index))
@@ -189,7 +189,7 @@ class SavedState:
             for index in range(raw.integer(count))
         ]
         self.units = raw.integer(_ACTIVE_TEXTURE), list(_units(raw, raw.integer(_TEXTURE_UNITS)))
-        raw.glActiveTexture(self.units[0])  # which the queries have changed
+        raw.glActiveTexture(self.units[0])  # the queries have changed it
         self.images = list(_images(raw))
         self.blocks = list(_blocks(raw))
         self.settings = [
@@ -261,7 +261,7 @@ def _images(raw: RawGL) -> Iterator[tuple[int, ...]]:
                 *(raw.integer(parameter, unit) for parameter in (0x8F3A, 0x8F3B, 0x8F3C, 0x8F3D, 0x8F3E, 0x906E)),
             )
         else:
-            yield unit, 0, 0, 0, 0, 0x88B8, 0x8229  # READ_ONLY, R8: as a context begins
+            yield unit, 0, 0, 0, 0, 0x88B8, 0x8229  # READ_ONLY, R8: the initial state
 
 
 def _blocks(raw: RawGL) -> Iterator[tuple[int, int, int, int, int]]:

@@ -1,4 +1,4 @@
-"""Fixed-function state as differences: a step's calls change only what the step before left otherwise."""
+"""Fixed-function state as differences: a step's calls change only what differs from the previous step."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ Pieces = dict[str, tuple[Call, ...]]
 def pieces(
     raw: RawGL, state: State, *, depth_test: bool, cull: str, clockwise: bool = False, targets: int = 1
 ) -> Pieces:
-    """The calls that set a state completely, by what they set; equal keys with equal `describe` need no call.
+    """Return the calls that set a state completely, by what they set; equal keys with equal `describe` need no call.
 
-    Colour mask, depth mask, viewport and scissor are the framebuffer object's (moderngl sets them with it).
+    Colour mask, depth mask, viewport and scissor belong to the framebuffer object (moderngl sets them with it).
 
     Args:
         depth_test: resolved from `state.depth_test` and the attachments.
@@ -80,7 +80,7 @@ def _stencil(raw: RawGL, stencil: Stencil | None) -> Iterator[Call]:
 
 
 def changes(before: Pieces | None, after: Pieces) -> list[Call]:
-    """The calls of `after` that differ from what `before` left."""
+    """Return the calls of `after` that differ from those of `before`."""
     if before is None:
         return [call for calls in after.values() for call in calls]
     return [

@@ -1,7 +1,7 @@
-"""Textures as immutable storage, views of them, transfers, clears and samplers.
+"""Textures with immutable storage, texture views, transfers, clears and samplers.
 
-Views need immutable storage. Samplers are separate objects, as two readers of one texture may differ and aliased
-textures would otherwise share filter state.
+Views need immutable storage. Samplers are separate objects, because readers of one texture may need different ones and
+aliased textures would otherwise share filter state.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _WRITE_ONLY, _FETCHED_OR_STORED = 0x88B9, 0x28
 
 
 class GpuTexture(Struct, frozen=True):
-    """A GL texture name with what it was created from."""
+    """A GL texture name with its description."""
 
     glo: int
     target: int
@@ -103,7 +103,7 @@ def delete(device: Device, texture: GpuTexture) -> None:
 
 
 def copies(device: Device, source: GpuTexture, target: GpuTexture) -> list[Callable[[], object]]:
-    """Return the calls that copy all texels of one texture to another of its description."""
+    """Return the calls that copy all texels of a texture to another with the same description."""
     return [
         partial(
             device.raw.glCopyImageSubData,
@@ -136,8 +136,8 @@ def read(
 ) -> npt.NDArray[Any]:
     """Return texels as (layers, height, width, channels), top row first; `stencil` as 32-bit integers, not the depth.
 
-    Samples are resolved: the mean of colours, one sample of depth, stencil and integers. `finish` comes first:
-    without it a software rasteriser has returned stale texels.
+    Samples are resolved: colours are averaged; depth, stencil and integers take one sample. `finish` comes first,
+    because a software rasteriser has returned stale texels without it.
     """
     desc = texture.desc
     if desc.samples > 1:
@@ -161,7 +161,7 @@ def read(
         raise RenderError(Problem("RG613", f"reading back a {desc.format} texture failed ({error})"))
     if FORMATS[desc.format].family == "depth_stencil":
         texels = texels[..., 1:].view(np.uint32) & 255 if stencil else texels[..., :1]
-    if FORMATS[desc.format].srgb:  # drivers return the encoded bytes; the values that the texels mean are linear
+    if FORMATS[desc.format].srgb:  # drivers return the encoded bytes; the texels' values are linear
         code = np.arange(256) / 255
         linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4).astype(np.float32)
         colors, alpha = np.take(linear, texels[..., :3]), texels[..., 3:] / np.float32(255)
@@ -181,9 +181,9 @@ def _bands(layers: int, height: int, row: int) -> Iterator[tuple[int, int, int, 
 
 
 def _resolved(device: Device, texture: GpuTexture) -> GpuTexture:
-    """A new texture with one sample a texel.
+    """Return a new texture with one sample per texel.
 
-    The driver does it, and of depth, stencil and whole numbers takes one sample of its choice.
+    The driver resolves it; for depth, stencil and integers it takes one sample of its choice.
     """
     raw, desc = device.raw, texture.desc
     made = create(device, replace(desc, samples=1), "a resolved texture")
@@ -229,11 +229,11 @@ def upload(
 
 
 def fill_mips(device: Device, texture: GpuTexture) -> None:
-    """Fill the levels of a 2D float texture, each with the exact mean of the one above, by texture and image unit 0.
+    """Fill the mip levels of a 2D float texture with exact means of the level above; uses texture and image unit 0.
 
-    A compute shader does it: Mesa's software rasteriser compiles its own program anew in each process, 0.1 to 0.15 s
-    for each format, but keeps those of its users on disk. Byte textures are left to the driver, which is faster at them
-    from a few million texels on.
+    It uses a compute shader, because Mesa's software rasteriser recompiles its own program in each process, 0.1 to
+    0.15 s per format, but caches programs of applications on disk. Byte textures are left to the driver, which is
+    faster from a few million texels on.
     """
     if device.mips is None:
         device.mips = device.ctx.compute_shader(Path(__file__).with_name("fill_mips.comp").read_text(encoding="ascii"))
@@ -266,9 +266,9 @@ def texel(value: float | tuple[float, ...], channels: int, dtype: Any) -> npt.ND
 
 
 class Clear:
-    """A clear of a texture, one mip or one layer, prepared once and called in every frame.
+    """A clear of a texture, mip or layer, prepared once and called in every frame.
 
-    The texture must not be a view in another format: Mesa stores wrong bits through some of these.
+    The texture must not be a view in another format: Mesa stores wrong bits through some such views.
     """
 
     def __init__(
@@ -287,7 +287,7 @@ class Clear:
         values = texel(value, channels, dtype)
         if FORMATS[desc.format].family == "depth_stencil":
             values[1:] = 0
-        if FORMATS[desc.format].srgb:  # a clear stores its value unchanged, while drawing encodes it
+        if FORMATS[desc.format].srgb:  # a clear stores its value unencoded, unlike a draw
             color = np.clip(values[:3], 0.0, 1.0)
             values[:3] = np.where(color <= 0.0031308, 12.92 * color, 1.055 * color ** (1 / 2.4) - 0.055)
         self._values = values  # kept alive: the calls below hold its address
@@ -304,7 +304,7 @@ class Clear:
 
 
 def poison_value(format_name: str) -> float:
-    """Return a value that no pass should ever show: NaN, or the largest if the format has none."""
+    """Return a value that no picture should show: NaN, or the largest if the format has none."""
     family = FORMATS[format_name].family
     if family == "float" and format_name != "r11f_g11f_b10f":
         return float("nan")
@@ -321,7 +321,7 @@ _WRAPS = {"clamp": 0x812F, "repeat": 0x2901, "mirror": 0x8370, "border": 0x812D}
 def create_texel_buffer(device: Device, buffer: int, format: str) -> int:
     """Create a texture that fetches `rgba32f` or `rgba32i` from a buffer.
 
-    Software rasterisers fetch texels in a third of the time that elements of a storage block take them.
+    Software rasterisers fetch texels in a third of the time of elements of a storage block.
     """
     texture = device.raw.make("glCreateTextures", 0x8C2A)
     device.raw.glTextureBuffer(texture, {"rgba32f": 0x8814, "rgba32i": 0x8D82}[format], buffer)
@@ -329,7 +329,7 @@ def create_texel_buffer(device: Device, buffer: int, format: str) -> int:
 
 
 def create_sampler(device: Device, sampler: Sampler) -> int:
-    """Create a sampler; its border is by default 1 in every channel (open and lit), and 0 for comparisons."""
+    """Create a sampler; its border is by default 1 in every channel (lit), and 0 for comparisons."""
     is_trilinear = sampler.filter == "trilinear"
     filters = ("linear_mipmap_linear", "linear") if is_trilinear else (sampler.filter, sampler.filter)
     wraps = sampler.wrap, sampler.wrap

@@ -1,9 +1,9 @@
-"""An upper bound on how far a shader's macros expand, found without expanding them.
+"""An upper bound on the expansion of a shader's macros, computed without expanding them.
 
-A few hundred bytes of macros that double each other exhaust the machine inside a driver's preprocessor. So the most
-words that one use of each macro can produce are computed from the words of its body, macros it refers to first; the
-arguments of a call count as often as the result repeats them. Conditions are ignored: all text counts, and of several
-definitions of a name the worst. Real shaders stay far below the limit.
+A few hundred bytes of macros that double each other exhaust the machine inside a driver's preprocessor. So the maximum
+number of words that one use of each macro can produce is computed from its body, after the macros that it refers to;
+arguments of a call count as often as the result repeats them. Conditions are ignored: all text counts, and the worst of
+several definitions of a name. Real shaders stay far below the limit.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def _parts(source: SourceText) -> tuple[list[_Definition], list[tuple[list[str],
 
 @lru_cache(8192)
 def _tokens(line: str) -> tuple[str, ...]:
-    """The words and signs of a line; shaders of variants and of one project share most lines."""
+    """Return the words and signs of a line; cached, because shaders of variants and projects share most lines."""
     return tuple(_TOKEN.findall(line))
 
 
@@ -100,7 +100,7 @@ def _joined(source: SourceText) -> Iterator[tuple[str, int]]:
 
 
 class _Growth(Struct, frozen=True):
-    """The most that one use of a macro produces.
+    """An upper bound on the result of one use of a macro.
 
     Attributes:
         words: words, not counting its arguments.
@@ -152,12 +152,12 @@ class _Macros:
                 self._growths[name] = self._growth(name)
             loose = max((self._growths[name].times for name in handed), default=1)
             if loose == self.loose or _ROUNDS - rounds_left > len(handed):
-                return  # each is called once on a path, so there are no more rounds than names
+                return  # each macro is called once per path, so rounds cannot exceed names
             self.loose = loose if rounds_left else _ENOUGH
 
     def walk(self, words: Sequence[str], inside: _Definition | None = None) -> Iterator[tuple[_Growth, int, int]]:
-        """For each word yield its growth, how often it is repeated, and how many calls are around it."""
-        own = inside.name if inside is not None else ""  # it is not expanded inside itself
+        """Yield for each word its growth, its repetitions, and the number of calls around it."""
+        own = inside.name if inside is not None else ""  # a macro is not expanded inside itself
         brackets = [(1, 0)]
         for before, word in pairwise(("", *words)):
             factor, around = brackets[-1]
@@ -178,14 +178,14 @@ class _Macros:
         pasted = [self._growths[name] for name in self._pasted[one.name]]
         words = depth = left_open = 0
         for word, (growth, factor, around) in zip(one.body, self.walk(one.body, one), strict=True):
-            if pasted:  # any of its words, to be simple
+            if pasted:  # could be any of its words
                 growth = _worst([growth, *pasted])
             if word in back:
                 back[word] += factor
             words += growth.words * factor
             depth = max(depth, around + growth.depth)
             left_open = max(0, left_open + (word == "(") - (word == ")"))
-        if left_open:  # text after the macro would be among the arguments
+        if left_open:  # text after the macro would become arguments
             words = _ENOUGH
         return _Growth(min(_ENOUGH, 1 + words), min(_ENOUGH, max([1, *back.values()])), depth + 1)
 
@@ -205,7 +205,7 @@ class _Macros:
         return sum(factor for word, (_, factor, _) in walked if pastes or word in names)
 
     def _order(self) -> tuple[list[str], list[str], list[str]]:
-        """Return names after all that they refer to; those on cycles and between; those that refer to these."""
+        """Return names in topological order; names on and between cycles; names that refer to those."""
         needs: dict[str, set[str]] = {}
         for name, alternatives in self._definitions.items():
             words = {word for one in alternatives for word in one.body}
@@ -226,9 +226,9 @@ def _worst(growths: Sequence[_Growth]) -> _Growth:
 
 
 def _sorted(needs: Mapping[str, Set[str]]) -> list[str]:
-    """Return names after all that they need; names on cycles, and those that need them, are left out."""
+    """Return names in topological order, without names on cycles and those that need them."""
     sorter = TopologicalSorter(needs)
-    with contextlib.suppress(CycleError):  # it goes on as far as it can
+    with contextlib.suppress(CycleError):  # it has then yielded all names that it could
         sorter.prepare()
     found: list[str] = []
     while ready := sorter.get_ready():

@@ -1,4 +1,4 @@
-"""Shader files: their text, their lines with the directives that rendergraph handles, and resolved links."""
+"""Shader files: their text, their lines with the directives that rendergraph handles, and symbolic links."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class LineRun(Struct, frozen=True, gc=False):
 
 
 class Links:
-    """Resolves symbolic links, each folder's once per instance, as every include asks."""
+    """Resolves symbolic links; caches folders, because every include needs them."""
 
     def __init__(self) -> None:
         self._followed: dict[str, str] = {}

@@ -1,7 +1,7 @@
 """The global `uniform`, `in`, `out` and `buffer` declarations of a text, with initialisers and positions. No GL.
 
-Like `names`, a scanner that also sees declarations inside `#if`: which branch is compiled depends on macros that only a
-pipeline knows.
+Like `names`, this is a scanner that also finds declarations inside `#if`: which branch is compiled depends on macros
+that only a pipeline knows.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ _NUMBER = re.compile(
 )
 _VECTOR = re.compile(r"([iu]?)vec([234])\s*\(([^()]*)\)\Z")
 _SWITCHES = {"true": True, "false": False}
-_LARGEST = 3.4028235e38  # what 32 bits hold
+_LARGEST = 3.4028235e38  # the largest float32
 _LONGEST = 100
 
 
@@ -153,6 +153,6 @@ def _number(text: str) -> int | float:
         value: int | float = float(found["real"])
     else:
         value = int(found["based"], 16) if found["based"] else int(found["whole"])
-    if value > _LARGEST:  # integers have no limit in Python, and no parameter is infinite
+    if value > _LARGEST:  # Python integers are unlimited, and no parameter is infinite
         raise ValueError("it is too large")
     return -value if found[1] == "-" else value

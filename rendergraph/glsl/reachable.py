@@ -1,4 +1,4 @@
-"""The names that a shader's `main` reaches through the functions, macros and values it uses. No GL."""
+"""The names that a shader's `main` reaches through functions, macros and values. No GL."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _DEFINED = re.compile(r"(!?)\s*defined\s*\(?\s*(\w+)\s*\)?\s*\Z")
 
 
 def reachable_names(text: str, *, certain: bool = False) -> set[str]:
-    """Return the names in `main` of a text without comments and in all that it uses; members after a dot do not count.
+    """Return the names in `main` of a text without comments and in all that it uses; members after a dot are ignored.
 
-    Branches of `#ifdef` are followed according to the text's own macros; of other conditions every branch counts, or
-    none if only what is compiled for certain is asked for.
+    Branches of `#ifdef` follow the text's own macros. For other conditions every branch counts, or none if `certain`
+    asks only for code that is compiled in any case.
     """
     uses: dict[str, list[Sequence[str]]] = {}
     words = tokens("\n".join(_taken(text, uses, certain)))
@@ -29,7 +29,7 @@ def reachable_names(text: str, *, certain: bool = False) -> set[str]:
         begin = head(statement)
         if body is not None and statement[-1:] == [")"]:
             for name, after in pairwise(statement):
-                if after == "(":  # after such a macro the function's own name is not the first
+                if after == "(":  # after such a macro, the first name is not the function's
                     uses.setdefault(name, []).extend([statement, body])
         elif body is None and begin.rest:
             for one, _, value in declarators(begin.rest[1:]):
@@ -45,14 +45,14 @@ def reachable_names(text: str, *, certain: bool = False) -> set[str]:
 
 
 def compiled_text(text: str, *, certain: bool = False) -> str:
-    """Return the lines of a text that are compiled, as far as its own macros decide it, without directives."""
+    """Return the compiled lines of a text, as far as its own macros decide, without directives."""
     return "\n".join(_taken(text, {}, certain))
 
 
 def _taken(text: str, uses: dict[str, list[Sequence[str]]], certain: bool) -> Iterator[str]:
     """Yield the lines that are compiled, without directives; the words of macros go to `uses`."""
     macros: set[str] = set()
-    branches: list[tuple[bool, bool | None, bool]] = []  # outside is taken; this one is, None: perhaps; one was
+    branches: list[tuple[bool, bool | None, bool]] = []  # taken: outer, this (None: unknown), earlier
     for line in text.replace("\\\n", " ").split("\n"):
         directive = _DIRECTIVE.match(line)
         taken = not branches or (
@@ -80,7 +80,7 @@ def _taken(text: str, uses: dict[str, list[Sequence[str]]], certain: bool) -> It
 
 def _condition(word: str, rest: str, macros: set[str]) -> bool | None:
     if rest.startswith(("GL_", "__")):
-        return None  # the driver's
+        return None  # only the driver knows
     if word != "if":
         return (rest in macros) == (word == "ifdef")
     asked = _DEFINED.match(rest)

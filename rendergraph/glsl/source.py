@@ -18,7 +18,7 @@ from rendergraph.glsl.names import declared, mentions
 from rendergraph.stamps import record_read
 
 MAX_DEPTH = 32
-"""Includes inside each other."""
+"""Maximum depth of nested includes."""
 
 
 class Origin(Struct, frozen=True):
@@ -26,7 +26,7 @@ class Origin(Struct, frozen=True):
 
     Attributes:
         file: the author's file, None for generated lines.
-        column: columns by which the line has moved to the right.
+        column: number of columns by which the line has moved to the right.
         shared: it comes from an include in angle brackets.
         prefix: the prefix of the names that the file declares.
         by: the line that includes the file, None for the file of a stage itself.
@@ -49,7 +49,7 @@ class Origin(Struct, frozen=True):
 
 
 class SourceBlock(Struct, frozen=True, gc=False):
-    """Consecutive lines of a file, comments blanked out, or generated lines; `origin` is that of the first."""
+    """Consecutive lines of a file, with comments blanked out, or generated lines; `origin` is that of the first."""
 
     lines: tuple[str, ...]
     origin: Origin
@@ -63,7 +63,7 @@ class SourceBlock(Struct, frozen=True, gc=False):
 
 
 class SourceText(Struct, frozen=True, dict=True):
-    """GLSL in which every line has an origin, computed only when something is wrong."""
+    """GLSL in which every line has an origin, computed only for error messages."""
 
     blocks: tuple[SourceBlock, ...] = ()
 
@@ -92,7 +92,7 @@ class SourceText(Struct, frozen=True, dict=True):
         """Return the place in the author's file of a character of the text, and its line."""
         number = self.text.count("\n", 0, at)
         origin, line = self.origins[number], self.lines[number]
-        if origin.column:  # a layout was put into the author's line
+        if origin.column:  # a layout was inserted into the author's line
             start = max(0, line.find("layout("))
             line = line[:start] + line[start + origin.column :]
         return origin.place(at - self.text.rfind("\n", 0, at)), line
@@ -102,7 +102,7 @@ class SourceText(Struct, frozen=True, dict=True):
 
 
 def generated(lines: Iterable[str], purpose: str = "") -> SourceText:
-    """Return lines of no file."""
+    """Return generated lines, which come from no file."""
     return SourceText((SourceBlock(tuple(lines), Origin(purpose=purpose)),))
 
 
@@ -121,10 +121,10 @@ _INCLUDE_NAME = re.compile(r'"([^"<>]+)"\Z|<([^"<>]+)>\Z')
 
 
 class Includes:
-    """Resolves the includes of one stage; each file is compiled once a stage, where it is first included.
+    """Resolves the includes of one stage; each file is compiled once per stage, where it is first included.
 
-    Whether an include inside `#if` is compiled only the driver's preprocessor knows: such text stands between guards
-    and is repeated where it is included again.
+    Only the driver's preprocessor knows whether an include inside `#if` is compiled: such text gets include guards and
+    is repeated at every further include.
     """
 
     def __init__(self, include_folder: Path, links: Links | None = None) -> None:
@@ -160,10 +160,10 @@ class Includes:
         """Return the text of a file with all its includes.
 
         Args:
-            root: the folder that includes in quotes must stay in; the file's own by default.
-            prefix: noted in the origins of every line that is not shared.
-            plugged: parameters in capitals with the file of their choice: `#include <SHADING>` is the file given here,
-                and nothing without one.
+            root: the folder in which includes in quotes must stay; the file's own by default.
+            prefix: recorded in the origins of all lines that are not shared.
+            plugged: parameters in capitals with the file of their choice: `#include <SHADING>` includes this file, or
+                nothing without one.
             versions: accept a `#version` of 330 to 460 in the file itself, and leave its line empty.
             inherited: more folders for includes in quotes that are not beside the file, each a root.
         """
@@ -184,7 +184,7 @@ class Includes:
         return SourceText(tuple(self._blocks))
 
     def _before_shadertoy(self, text: str) -> None:
-        """Declare what a Shadertoy program reads and writes: its channels, where it names them, and two outputs."""
+        """Declare what a Shadertoy program reads and writes: the channels that it names, and two outputs."""
         found = {match[1] for match in _CHANNEL.finditer(text)}
         channels = sorted(found - {None}) if found else []
         lines = [f"uniform sampler2D iChannel{number};" for number in channels]
@@ -293,7 +293,7 @@ class Includes:
 
 
 def old_name_pattern(old: str) -> str:
-    """Return what finds an old name in a shader's text."""
+    """Return a pattern that finds an old name in a shader's text."""
     pattern = re.escape(old).replace(r"\(\)", r"(?=\s*\()") + r"(?!\w)"
     return pattern if old[0] == "." else r"(?<![\w.])" + pattern
 
@@ -317,7 +317,7 @@ def find_old_names(source: SourceText, include_folder: Path) -> tuple[dict[str, 
         name = old.strip("<>.()")
         match = re.search(old_name_pattern(old), text)
         defined = rf"(?m)^\s*\w+\s+{new}\s*\([^;{{}}]*\)\s*\{{|\b(?:define|struct)\s+{new}\b"
-        is_own = match and name in declared(text) and re.search(defined, shared)  # not what an include lets it define
+        is_own = match and name in declared(text) and re.search(defined, shared)  # not one that an include uses
         if match and not is_own and (old[0] == "<" or name.startswith("v_") or mentions(shared, new)):
             macros |= {name: new} if old[0] != "<" else {}
             before = text[: match.start()].split("\n")

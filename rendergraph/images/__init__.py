@@ -1,7 +1,7 @@
 """Pictures on disk. OpenImageIO is imported on first use.
 
 `decode` prepares a scene's image for the GPU, `write` and `read` are the plain functions, `viewable` turns any texture
-into a picture that an eye can read, and `save_outputs` chooses what of a frame goes into which kind of file.
+into a viewable picture, and `save_outputs` converts a frame's outputs to the formats of files.
 """
 
 from rendergraph.images.decode import decode, decode_light, read, read_metadata

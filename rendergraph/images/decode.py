@@ -1,4 +1,4 @@
-"""Reading images: textures and environments of a scene, and pictures written earlier. Mistakes are InputErrors."""
+"""Read images: textures and environments of a scene, and pictures written earlier. Mistakes raise InputErrors."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ _BRADFORD = np.array([(0.8951, 0.2664, -0.1614), (-0.7502, 1.7135, 0.0367), (0.0
 def decode(source: ImageSource, *, srgb: bool, warn: Warn | None = None, limits: SceneLimits = SceneLimits()) -> Pixels:
     """Decode a scene's image for upload: (height, width, 4), top row first, uint8 or float16.
 
-    Grey becomes three equal channels and a missing alpha 1; alpha is not multiplied in. Integer images keep their
-    encoding (`srgb` ones are uploaded to an sRGB format); images of more than 8 bits that are not sRGB become floats
-    0…1. HDR and EXR values are linear light, whatever `srgb` says; NaN becomes 0 and what is beyond the largest half
-    float becomes 65504, with a warning that counts the pixels. Colours (`srgb`) of an EXR file that states other
-    primaries are converted to Rec. 709.
+    Grey becomes three equal channels and a missing alpha 1; alpha is straight. Integer images keep their encoding
+    (`srgb` ones are uploaded to an sRGB format); images with more than 8 bits that are not sRGB become floats 0…1. HDR
+    and EXR values are linear light, whatever `srgb` says; NaN becomes 0 and values beyond the largest half float become
+    65504, with a warning that counts the pixels. Colours (`srgb`) of an EXR file with other primaries are converted to
+    Rec. 709.
     """
     if source.loader is not None:
         return _decode_by_plugin(source, source.loader, warn, limits)
@@ -45,15 +45,15 @@ def decode(source: ImageSource, *, srgb: bool, warn: Warn | None = None, limits:
     pixels = _finite(source, pixels, warn)
     if primaries is not None and pixels.shape[-1] >= 3 and not np.allclose(primaries, REC709, atol=1e-3):
         colors = pixels[..., :3].astype(np.float32) @ to_rec709(primaries).T.astype(np.float32)
-        pixels[..., :3] = np.clip(colors, 0, HALF_MAX)  # what lies outside of Rec. 709 is clipped
+        pixels[..., :3] = np.clip(colors, 0, HALF_MAX)  # colours outside Rec. 709 are clipped
     return _as_rgba(pixels)
 
 
 def to_rec709(primaries: Sequence[float]) -> npt.NDArray[np.float64]:
-    """Return the matrix (3, 3) to linear Rec. 709 from the colours of these primaries.
+    """Return the matrix (3, 3) from colours with these primaries to linear Rec. 709.
 
-    `primaries` are x and y of red, green, blue and white, as OpenEXR states them. White stays white, by a von Kries
-    adaptation in the cone space of Bradford (Lam 1985).
+    `primaries` are x and y of red, green, blue and white, as in OpenEXR. White stays white, by von Kries adaptation in
+    the Bradford cone space (Lam 1985).
     """
     source, white = _to_xyz(primaries)
     target, daylight = _to_xyz(REC709)
@@ -109,7 +109,7 @@ def read(path: Path | str) -> Pixels:
 
 
 def read_metadata(path: Path | str) -> dict[str, str]:
-    """Read the texts `write` put into an EXR or PNG file; empty if there are none."""
+    """Read the metadata that `write` stored in an EXR or PNG file; empty if there is none."""
     with _opened(ImageSource(Path(path)), SceneLimits()) as image:
         attributes = [(entry.name, entry.value) for entry in image.spec.extra_attribs]
     return {name[len(PREFIX) :]: text for name, text in attributes if name.startswith(PREFIX) and isinstance(text, str)}
@@ -138,7 +138,7 @@ def _counted(count: int) -> str:
 
 
 def _in_display_window(image: ImageFile, pixels: Pixels) -> Pixels:
-    """Place the stored part of an EXR file in its display window; the rest is 0."""
+    """Place the data window of an EXR file in its display window; the rest is 0."""
     spec = image.spec
     window = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
     if image.kind != ".exr" or window == (spec.x, spec.y, spec.width, spec.height):
@@ -172,7 +172,7 @@ def _finite(source: ImageSource, pixels: Pixels, warn: Warn | None) -> Pixels:
 
 
 def _as_rgba(pixels: Pixels) -> Pixels:
-    """Four channels from one to four: grey three times, and an alpha of one."""
+    """Return four channels from one to four: grey is repeated, and a missing alpha is 1."""
     height, width, count = pixels.shape
     one = 255 if pixels.dtype == np.uint8 else 1
     rgba = np.full((height, width, 4), one, dtype=pixels.dtype)
@@ -200,7 +200,7 @@ def _decode_by_plugin(
     pixels = pixels.reshape(*pixels.shape[:2], -1)
     if pixels.dtype == np.uint8:
         return _as_rgba(pixels)
-    with np.errstate(over="ignore"):  # what a half float cannot hold becomes infinite, and is reported
+    with np.errstate(over="ignore"):  # values beyond half floats become infinite, and are reported
         light = pixels.astype(np.float16)
     return _as_rgba(_finite(source, light, warn))
 
@@ -215,5 +215,5 @@ def _plugin_mistake(pixels: object, limits: SceneLimits) -> str:
     height, width = pixels.shape[:2]
     if max(height, width) > limits.image_side or height * width * 8 > limits.image_bytes:
         megabytes = limits.image_bytes >> 20
-        return f"{width}×{height} pixels; the limit is {limits.image_side} a side and {megabytes} MiB"
+        return f"{width}×{height} pixels; the limit is {limits.image_side} per side and {megabytes} MiB"
     return ""

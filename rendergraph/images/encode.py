@@ -1,4 +1,4 @@
-"""Writing one picture file."""
+"""Write picture files."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ EXTENSIONS: dict[str, str] = {".png": "png", ".jpg": "jpeg", ".jpeg": "jpeg", ".
 """Extension, in lower case, to OpenImageIO's name of the format."""
 HALF_MAX = 65504.0
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-"""Chromaticities x and y of red, green, blue and white (ITU-R BT.709), which EXR files of light state."""
+"""Chromaticities x and y of red, green, blue and white (ITU-R BT.709), stored in EXR files of light."""
 PREFIX = "rendergraph:"
 
 _NAMES = {1: ("Y",), 2: ("R", "G"), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
 _EXACT_INTEGER = 1 << 24
-# OpenEXR stamps the time of writing; equal pictures shall be equal files.
+# OpenEXR stores the time of writing, but equal pictures must give equal files.
 _NO_DATE = "1970:01:01 00:00:00"
 _PNG_COLOR_TYPES = {1: 0, 3: 2, 4: 6}
 """Grey, RGB and RGBA by their number of channels (PNG specification, 11.2.1)."""
 _PNG_LEFT = 1
-"""The filter that leaves the difference to the pixel on the left; to choose one row by row costs more than it saves."""
+"""The PNG filter Sub, difference to the left; choosing a filter per row costs more than it saves."""
 _PNG_LEVEL = 4
 
 
@@ -50,16 +50,16 @@ def write(
     metadata: Mapping[str, str] | None = None,
     half: bool = False,
 ) -> None:
-    """Write one picture, whole or not at all; the extension chooses the format.
+    """Write one picture atomically; the extension chooses the format.
 
-    PNG and JPEG hold 8 bits: floats are clipped to 0…1 and rounded, after the sRGB curve where they are `linear`. EXR
-    and HDR hold linear light: `display` values are decoded first. `data` is written as it is everywhere.
+    PNG and JPEG hold 8 bits: floats are clipped to 0…1 and rounded, after the sRGB curve if they are `linear`. EXR and
+    HDR hold linear light: `display` values are decoded first. `data` is always written unchanged.
 
     Args:
         pixels: (height, width), (height, width, channels) or (layers, height, width, channels), top row first.
-        channels: names for EXR; by default `Y`, `R,G`, `R,G,B` or `R,G,B,A`. Layers put `000.` and so on before them.
-        encoding: of the values.
-        metadata: texts in EXR and PNG files; `read_metadata` returns them.
+        channels: names for EXR; by default `Y`, `R,G`, `R,G,B` or `R,G,B,A`. Layers prepend `000.` and so on.
+        encoding: the encoding of the values.
+        metadata: texts stored in EXR and PNG files; `read_metadata` returns them.
         half: 16-bit floats in EXR; values beyond ±65504 become that.
     """
     write_all([(Path(path), pixels, channels, encoding, half)], metadata or {})
@@ -69,14 +69,14 @@ Job: TypeAlias = "tuple[Path, Pixels, Sequence[str] | None, Encoding, bool]"
 
 
 def write_all(jobs: Sequence[Job], metadata: Mapping[str, str]) -> None:
-    """Write pictures that appear together; each job is the arguments of `write`."""
+    """Write several pictures atomically; each job has the arguments of `write`."""
     with staged([job[0] for job in jobs]) as parts:
         for part, job in zip(parts, jobs, strict=True):
             _write_job(job, part, metadata)
 
 
 def picture_bytes(job: Job, metadata: Mapping[str, str]) -> bytes:
-    """Return the bytes of the file that `write_all` would write; nothing is left behind where the process is killed."""
+    """Return the bytes of the file that `write_all` would write; nothing is left behind if the process is killed."""
     with system.memory_file() as (path, file):
         _write_job(job, Path(path), metadata)
         return file.read()
@@ -120,13 +120,13 @@ def _values(path: Path, pixels: Pixels) -> Pixels:
     if np.issubdtype(pixels.dtype, np.floating):
         return pixels
     if pixels.size and max(int(pixels.max()), -int(pixels.min())) > _EXACT_INTEGER:
-        raise _error(path, f"whole numbers above {_EXACT_INTEGER} (24 bits) cannot be kept in a picture")
-    # 8-bit arrays are colours 0…1 that have not been divided yet, wider integers are numbers.
+        raise _error(path, f"integers above {_EXACT_INTEGER} (24 bits) cannot be stored in a picture")
+    # 8-bit arrays are colours, still to be divided by 255; wider integers are numbers.
     return pixels.astype(np.float32) / (255 if pixels.dtype == np.uint8 else 1)
 
 
 def _radiance(path: Path, pixels: Pixels) -> Pixels:
-    """Three channels without negative values, as the Radiance format stores."""
+    """Return three channels without negative values, as the Radiance format stores."""
     if pixels.ndim == 4:
         raise _error(path, "layers do not fit an HDR picture; write an EXR")
     if pixels.shape[-1] == 1:
@@ -155,7 +155,7 @@ def _write_file(
         with open(part, "wb") as file:
             file.writelines(_png(pixels, texts))
         return
-    import OpenImageIO as oiio  # loaded with the first picture that is no PNG
+    import OpenImageIO as oiio  # loaded with the first picture that is not a PNG
 
     height, width, count = pixels.shape
     spec = oiio.ImageSpec(width, height, count, kind)
@@ -189,10 +189,10 @@ def _write_file(
 
 @contextlib.contextmanager
 def _safe_place(path: Path, part: Path) -> Iterator[str]:
-    """A path for OpenImageIO.
+    """Yield a path for OpenImageIO.
 
-    On a full disk the Radiance writer reports success and libjpeg ends the process, so these write to memory first;
-    OpenEXR reports the failure. A picture whose name is not text is written to memory, too.
+    On a full disk, the Radiance writer reports success and libjpeg ends the process, so these write to memory first;
+    OpenEXR reports the failure. A picture whose name is not text is also written to memory.
     """
     if path.suffix.lower() == ".exr" and is_text(str(part)):
         yield str(part)
@@ -204,10 +204,10 @@ def _safe_place(path: Path, part: Path) -> Iterator[str]:
 
 
 def _png(pixels: npt.NDArray[np.uint8], texts: Mapping[str, str]) -> Iterator[bytes]:
-    """The parts of a PNG file of 8 bits, in half of OpenImageIO's time, and without the time to import it.
+    """Yield the parts of an 8-bit PNG file, in half the time of OpenImageIO and without importing it.
 
     Args:
-        pixels: (height, width, 1, 3 or 4 channels), top row first, sRGB-encoded; alpha is not multiplied in.
+        pixels: (height, width, 1, 3 or 4 channels), top row first, sRGB-encoded, straight alpha.
     """
     height, width, count = pixels.shape
     yield b"\x89PNG\r\n\x1a\n"

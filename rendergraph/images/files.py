@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Atomic writing of files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _PICTURES = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
 
 
 def failed(path: Path, reason: str) -> RenderError:
-    """The error for a file that could not be written."""
+    """Return the error for a file that could not be written."""
     what = "picture" if path.suffix.lower() in _PICTURES else "file"
     return RenderError(Problem("RG507", f"the {what} cannot be written: {reason}", Place(str(path))))
 
@@ -23,8 +23,8 @@ def failed(path: Path, reason: str) -> RenderError:
 def staged(paths: Sequence[Path]) -> Iterator[list[Path]]:
     """Yield a temporary path beside each path, to be written; they replace the paths together if the block succeeds.
 
-    A link is followed, so that it stays a link. Each temporary file is flushed to the disk before the rename and its
-    folder after it; whatever ends the block early, an interrupt included, leaves nothing behind.
+    Symbolic links are followed, so that they stay links. Each temporary file is flushed to disk before the rename, and
+    its folder afterwards; if the block ends early, even by an interrupt, nothing is left behind.
     """
     targets = [Path(os.path.realpath(path)) for path in paths]
     temporary = [target.with_name(f".{target.name[:100]}.{os.urandom(4).hex()}.part") for target in targets]
@@ -52,7 +52,7 @@ def write_file(path: Path, content: str | bytes) -> None:
 
 
 def replace_text(path: Path, text: str) -> None:
-    """Write a text file anew as a whole; its mode stays, and so does a byte order mark, which is not in the text."""
+    """Replace a text file atomically, keeping its mode and byte order mark, which is not part of the text."""
     mark = b"\xef\xbb\xbf" if path.read_bytes().startswith(b"\xef\xbb\xbf") else b""
     with staged([path]) as (part,):
         part.write_bytes(mark + text.encode("utf-8"))
@@ -60,7 +60,7 @@ def replace_text(path: Path, text: str) -> None:
 
 
 def flush(path: Path) -> None:
-    """Return when a file, or the names in a folder, are on the disk."""
+    """Flush a file, or the names in a folder, to disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

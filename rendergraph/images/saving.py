@@ -1,4 +1,4 @@
-"""Which output goes into which file, and what of it: one answer for the command line, Python and notebooks."""
+"""Choose and convert outputs for files, for the command line, Python and notebooks."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Pixels: TypeAlias = npt.NDArray[Any]
 
 
 class TexelInfo(Protocol):
-    """What is known of an array's values, such as a frame's `info(name)`; `PictureInfo` describes the properties."""
+    """The meaning of an array's values, such as a frame's `info(name)`; `PictureInfo` describes the properties."""
 
     @property
     def semantic(self) -> str: ...
@@ -34,10 +34,10 @@ class TexelInfo(Protocol):
 
 
 class PictureInfo(Struct, frozen=True):
-    """What is known of an array's values without a frame.
+    """The meaning of an array's values without a frame.
 
     Attributes:
-        semantic: its name, `any` if unknown.
+        semantic: name of the semantic, `any` if unknown.
         format: a name in `textures.FORMATS`, empty if unknown.
         encoding: `display` for sRGB-encoded colours, `linear` for linear ones, else None.
     """
@@ -49,7 +49,7 @@ class PictureInfo(Struct, frozen=True):
 
 
 def channel_names(info: TexelInfo, count: int) -> tuple[str, ...]:
-    """The names of `count` channels in an EXR file."""
+    """Return the names of `count` channels in an EXR file."""
     if count > 1:
         return ("R", "G", "B", "A")[:count]
     known = FORMATS.get(info.format)
@@ -63,7 +63,7 @@ _HALF_FORMATS = frozenset({"r16f", "rg16f", "rgba16f", "r11f_g11f_b10f"})
 class Saved(NamedTuple):
     """One file to save: (height, width[, channels]) or (layers, height, width, channels) pixels, top row first.
 
-    A `raw` one is a tap: EXR and HDR keep its values, also of display colours.
+    A `raw` file is a tap: EXR and HDR store its values unchanged, even display colours.
     """
 
     path: Path
@@ -75,15 +75,15 @@ class Saved(NamedTuple):
 def save_output(
     path: Path | str, pixels: Pixels, info: TexelInfo, metadata: Mapping[str, str], *, raw: bool = False
 ) -> None:
-    """Save one output or tap: see `save_outputs`."""
+    """Save one output or tap; see `save_outputs`."""
     save_outputs([Saved(Path(path), pixels, info, raw)], metadata)
 
 
 def save_outputs(files: Sequence[Saved], metadata: Mapping[str, str]) -> None:
-    """Save outputs and taps as files that appear together.
+    """Save outputs and taps as files, atomically.
 
-    PNG and JPEG are made viewable. EXR and HDR hold linear light, so display colours are decoded; a tap's values are
-    kept as they are.
+    PNG and JPEG are made viewable. EXR and HDR hold linear light, so display colours are decoded; a tap's values stay
+    unchanged.
     """
     write_all(list(map(_job, files)), metadata)
 
@@ -101,7 +101,7 @@ def _job(file: Saved) -> Job:
         straight = np.minimum((pixels[..., :3].astype(np.uint32) * 255 + whole // 2) // whole, 255).astype(np.uint8)
         if extension(path) == ".png":
             return path, np.concatenate([straight, alpha], axis=-1), None, "data", False
-        if decoded and extension(path) == ".exr":  # colours are decoded first, and multiplied by alpha as light
+        if decoded and extension(path) == ".exr":  # premultiply linear values, after decoding
             share = alpha / np.float32(255)
             return path, np.concatenate([from_srgb(straight) * share, share], axis=-1), tuple("RGBA"), "linear", True
     if EXTENSIONS[extension(path)] in ("png", "jpeg"):
@@ -124,13 +124,13 @@ def viewable_as(pixels: Pixels, info: TexelInfo) -> Bytes:
 
 
 def _numbers(pixels: Pixels, info: TexelInfo) -> Pixels:
-    """Whole numbers as such; other 8-bit arrays are colours."""
+    """Return integers as numbers; other 8-bit arrays are colours."""
     known = FORMATS.get(info.format)
     return pixels.astype(np.int64) if known and known.family in ("uint", "int") else pixels
 
 
 def extension(path: Path, others: Iterable[str] = ()) -> str:
-    """Return a file's extension in lower case, which must be that of a picture; a message names `others` as well."""
+    """Return a file's lower-case extension, which must be that of a picture; a message also lists `others`."""
     suffix = path.suffix.lower()
     if suffix in EXTENSIONS:
         return suffix
@@ -164,7 +164,7 @@ _HASHES = re.compile(r"#{2,}")
 
 
 def is_numbered(path: Path) -> bool:
-    """Whether a file name has a placeholder for the frame's number: two `#` or more in a row."""
+    """Return whether a file name has a placeholder for the frame number: two or more consecutive `#`."""
     return bool(_HASHES.search(path.name))
 
 
@@ -174,7 +174,7 @@ def numbered(path: Path, frame: int) -> Path:
 
 
 def stands_for(path: Path, file: str) -> bool:
-    """Whether a file, links followed, may be the file of some frame."""
+    """Return whether a file, with symbolic links resolved, may be the file of a frame."""
     parts = [re.escape(part) for part in _HASHES.split(path.name)]
     if len(parts) == 1 or os.path.dirname(file) != os.path.realpath(path.parent):
         return False

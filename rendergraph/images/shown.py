@@ -21,10 +21,10 @@ _COLORS = frozenset({"display_color", "radiance", "albedo", "emissive", "normal"
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """A picture of a texture that shows itself in a notebook.
+    """A picture of a texture, with a rich display in notebooks.
 
     Attributes:
-        name: of the output or port, with its layer and channel.
+        name: the output or port, with layer and channel.
         pixels: uint8 (height, width, 1 or 3), top row first.
         low, high: the values of the darkest and of the brightest false colour; None for colours.
     """

@@ -1,4 +1,4 @@
-"""Films: frames as MP4, WebP or GIF, encoded by the ffmpeg that imageio-ffmpeg brings."""
+"""Films: frames as MP4, WebP or GIF, encoded by the ffmpeg of imageio-ffmpeg."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ ENDINGS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     ".webp": ("libwebp_anim", "yuva420p", ("-quality", "90", "-loop", "0", "-f", "webp")),
     ".gif": ("gif", "pal8", ("-filter_complex", _PALETTE, "-loop", "0", "-f", "gif")),
 }
-"""The codec of each kind of film, the format of its pixels, and further options of ffmpeg.
+"""The codec of each kind of film, its pixel format, and further options of ffmpeg.
 
-H.264 with 4:2:0 colours is what every player shows; odd sides grow by a row of black. The others repeat for ever; a GIF
-has 256 colours of its own.
+Every player supports H.264 with 4:2:0 chroma; odd sides are padded by a black row or column. The others loop forever; a
+GIF has its own palette of 256 colours.
 """
 
 
@@ -36,7 +36,7 @@ def is_film(path: Path) -> bool:
 
 
 def check_film(path: Path) -> Path:
-    """Return the path of a film that can be written, else raise."""
+    """Return the path of a film; raise if such a film cannot be written."""
     if not is_film(path):
         hint = suggestion(path.suffix, ENDINGS)
         raise UsageError(Problem("RG501", f"'{path.suffix}' films are not written{hint}"))
@@ -59,10 +59,10 @@ def films(paths: Iterable[Path], fps: float, first: int) -> Iterator[dict[Path, 
 
 
 class Film:
-    """A file of frames, added in any order, that appears when it is complete; the extension says of which kind."""
+    """A film whose frames are added in any order; the file appears when complete. The extension sets the format."""
 
     def __init__(self, path: Path, fps: float, first: int) -> None:
-        """Prepare a film of `fps` frames a second that begins with frame number `first`."""
+        """Prepare a film of `fps` frames per second that begins with frame number `first`."""
         self.path = path
         self._fps, self._next = fps, first
         self._early: dict[int, npt.NDArray[Any]] = {}
@@ -79,7 +79,7 @@ class Film:
 
     def _write(self, pixels: npt.NDArray[Any]) -> None:
         if self._writer is None:
-            imageio_ffmpeg: Any = import_module("imageio_ffmpeg")  # an extra, of which little is typed
+            imageio_ffmpeg: Any = import_module("imageio_ffmpeg")  # an optional package with few types
 
             height, width = pixels.shape[:2]
             codec, pixel_format, more = ENDINGS[self.path.suffix.lower()]

@@ -1,16 +1,16 @@
-"""Any texture as a picture that an eye can read; colour maps; contact sheets.
+"""Viewable pictures of any texture; colour maps; contact sheets.
 
 | texels mean | 8-bit picture |
 |---|---|
-| `display_color` | as they are |
+| `display_color` | unchanged |
 | `radiance`, `albedo`, `emissive`, `luminance`, a plugin's with linear encoding | clipped to 0…1, sRGB curve |
 | `normal` | −1…1 becomes 0…1, no curve |
-| `depth`, `linear_depth`, `shadow_map` | nearest black, farthest white, what nothing covers white |
-| `visibility`, `occlusion`, `material` | 0…1 as it is, no curve |
-| whole numbers | a colour each, 0 black |
-| anything else | 0…1 as it is; where values lie outside, scaled so that all but a hundredth at each end fit |
+| `depth`, `linear_depth`, `shadow_map` | nearest black, farthest white, uncovered texels white |
+| `visibility`, `occlusion`, `material` | 0…1 unchanged, no curve |
+| integers | a colour for each, 0 black |
+| anything else | 0…1 unchanged; values outside: scaled so that all but 1 % at each end fit |
 
-One channel is grey, two are red and green, a fourth is left out; layers lie in a grid, row by row. NaN is magenta.
+One channel is grey, two are red and green, a fourth is ignored; layers form a grid, row by row. NaN is magenta.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _WINDOW_DEPTH = frozenset({"depth", "shadow_map"})  # reversed: greater is neare
 _UNIT = frozenset({"display_color", "visibility", "occlusion", "material"})
 _NAN_COLOR = (255, 0, 255)
 _BELOW_COLOR, _ABOVE_COLOR = (40, 80, 255), (255, 40, 40)
-# Black through purple and orange to pale yellow: brightness alone gives the order.
+# Black through purple and orange to pale yellow, with increasing brightness.
 _HEAT = np.array([(0, 0, 4), (81, 18, 124), (183, 55, 121), (252, 137, 97), (252, 253, 191)], np.float64)
 _TILE_WIDTH, _TILE_HEIGHT = 320, 180
 _TILE_GAP, _LINE_HEIGHT = 12, 18
@@ -62,7 +62,7 @@ def to_bytes(unit: Pixels) -> Bytes:
 
 
 def heat_map(values: Pixels) -> Bytes:
-    """Values 0…1 as colours; NaN counts as 1."""
+    """Map values 0…1 to colours; NaN counts as 1."""
     position = np.clip(np.nan_to_num(values, nan=1.0), 0, 1) * (len(_HEAT) - 1)
     lower = np.minimum(position.astype(int), len(_HEAT) - 2)
     fraction = (position - lower)[..., np.newaxis]
@@ -71,7 +71,7 @@ def heat_map(values: Pixels) -> Bytes:
 
 
 def signed_map(values: Pixels) -> Bytes:
-    """Values -1…1 as colours: blue below 0, black at 0, orange above, at full strength from 0.5; NaN is magenta."""
+    """Map values -1…1 to colours: blue below 0, black at 0, orange above, saturated beyond ±0.5; NaN is magenta."""
     amount = np.clip(2 * np.abs(np.nan_to_num(values, nan=0.0)), 0, 1)[..., np.newaxis]
     low, high = (np.array(color, np.float64) for color in ((90, 160, 255), (255, 150, 50)))
     colors = np.where(values[..., np.newaxis] < 0, low, high) * amount
@@ -97,9 +97,9 @@ def viewable(array: Pixels, semantic: str = "any", encoding: str | None = None) 
 
 
 def mapped(array: Pixels, scale: str, low: float | None, high: float | None) -> tuple[Bytes, str]:
-    """Return a picture of a texture with a chosen range, and the mapping in words.
+    """Return a picture of a texture with a chosen range, and a description of the mapping.
 
-    NaN is magenta; what lies beyond a chosen range is blue below it and red above it.
+    NaN is magenta; values outside a chosen range are blue below it and red above it.
 
     Args:
         scale: `linear` and `log` from black to white, `heat` in false colours; the last shows the mean of channels.
@@ -151,9 +151,9 @@ def _colors(array: Pixels, semantic: str, *, light: bool) -> Bytes:
 
 
 def _stretched(array: Pixels, background: float, outside: float = 0.0) -> npt.NDArray[np.float32]:
-    """Least to greatest becomes 0 to 1; texels at `background` or beyond become 1 and do not count.
+    """Scale minimum to maximum to 0…1; texels at `background` or beyond become 1 and do not count.
 
-    `outside` is the part of the values at each end that may lie beyond: a highlight would leave nothing of the rest.
+    `outside` is the fraction of values at each end that may be clipped: otherwise a highlight would darken the rest.
     """
     values = np.asarray(array, dtype=np.float32)
     covered = values[np.isfinite(values) & (values < background)]
@@ -169,7 +169,7 @@ def _stretched(array: Pixels, background: float, outside: float = 0.0) -> npt.ND
 
 
 def _palette(array: Pixels) -> Bytes:
-    """A colour for each whole number, far apart for neighbours: the golden ratio's multiples as hues."""
+    """Return a colour for each integer, with distinct ones for neighbours: multiples of the golden ratio as hues."""
     number = array[..., 0].astype(np.int64) if array.shape[-1] == 1 else _joined(array)
     hue = (number % 65536 * 0.6180339887) % 1.0
     thirds = np.array([1.0, 2 / 3, 1 / 3])
@@ -196,9 +196,9 @@ def _grid(layers: Bytes) -> Bytes:
 
 
 def contact_sheet(pictures: Sequence[tuple[Bytes, str, str]]) -> Bytes:
-    """Arrange pictures in rows on a sheet about as wide as high, each fitted into 320×180; (height, width, 3).
+    """Arrange pictures in rows on a roughly square sheet, each fitted into 320×180; (height, width, 3).
 
-    A picture is (height, width, 1 or 3), with a name and a note beneath, which are missing if OpenImageIO has no font.
+    A picture is (height, width, 1 or 3), with a name and a note beneath, which are omitted if OpenImageIO has no font.
     """
     import OpenImageIO as oiio  # loaded with the first picture written
 
@@ -217,12 +217,12 @@ def contact_sheet(pictures: Sequence[tuple[Bytes, str, str]]) -> Bytes:
         for line, (text, grey) in enumerate(((name, _NAME_GREY), (note, _NOTE_GREY)), start=1):
             y = top + _TILE_HEIGHT + line * _LINE_HEIGHT - 4
             oiio.ImageBufAlgo.render_text(written, left, y, text, _FONT_SIZE, "", (grey,) * 3)
-    written.geterror()  # without a font; an error that nobody fetches is printed at the end
+    written.geterror()  # discard the error of a missing font, which would be printed at exit
     return np.asarray(written.get_pixels(oiio.UINT8), np.uint8)
 
 
 def _fit_tile(picture: Bytes) -> Bytes:
-    """As large as a tile takes it: averaged where it shrinks, texels as squares where it grows."""
+    """Fit a picture into a tile: averaged if it shrinks, nearest neighbour if it grows."""
     import OpenImageIO as oiio  # loaded with the first picture written
 
     height, width = picture.shape[:2]

@@ -1,7 +1,7 @@
-"""The grammar of the files we read: tables of keys with their types, and one validator that checks a file against them.
+"""The grammar of input files: tables of keys with their types, and a validator that checks a file against them.
 
-Pipelines, scenes, sweeps, project settings and the headers of shader files have one table each. From it come the check
-of a file, `rendergraph explain`, the pages of the reference and the JSON Schemas for editors.
+Pipelines, scenes, sweeps, project settings and the headers of shader files have one table each, which defines the check
+of a file, `rendergraph explain`, the reference pages and the JSON Schemas for editors.
 """
 
 from __future__ import annotations

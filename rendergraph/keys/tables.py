@@ -1,4 +1,4 @@
-"""Tables: the keys of the mappings in a file, known ones or names that authors choose."""
+"""Tables: the keys of mappings in a file, known keys or names that authors choose."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class Key(Struct, frozen=True):
 
     Attributes:
         type: the type of its values: an annotation, see `keys.values`, or a mapping.
-        default: the value where the file has none; None where that means absent.
+        default: the value if the file has none; None means absent.
         unit: the unit's symbol, empty for a pure number.
         example: how it is written, for messages.
-        code: of the mistake that a value does not fit; empty for the file's usual one.
+        code: error code for a value that does not fit; empty for the file's usual one.
     """
 
     name: str
@@ -40,11 +40,11 @@ class Table(Struct, frozen=True, dict=True):
     """A mapping with known keys.
 
     Attributes:
-        what: how messages name it, `light '{}'`, with its own name put in.
-        alternatives: keys of which exactly one is required, and the further keys that each allows: always the same, or
-            by the word that is its value.
-        refused: keys that one might look for, with the message for each.
-        code: of an unknown key; empty for the file's usual one.
+        what: its name in messages, such as `light '{}'`, which is formatted with the entry's name.
+        alternatives: keys of which exactly one is required, and the further keys that each allows, always or by its
+            value.
+        refused: keys that users might expect, with the message for each.
+        code: error code for an unknown key; empty for the file's usual one.
     """
 
     what: str
@@ -58,7 +58,7 @@ class Table(Struct, frozen=True, dict=True):
         return {key.name: key for key in self.keys}
 
     def keys_of(self, value: Value) -> dict[str, Key]:
-        """The keys that a mapping may hold: of an alternative whose word is unknown those of all words."""
+        """Return the keys that a mapping may have; an alternative with an unknown value allows those of all values."""
         found = self._common
         for name, allowed in self.alternatives.items():
             given = value.get(name)
@@ -70,7 +70,7 @@ class Table(Struct, frozen=True, dict=True):
         return found
 
     def sections(self, name: str = "") -> Iterator[tuple[str, tuple[Key, ...]]]:
-        """All keys of the table and of the tables in it, section by section, each with its name."""
+        """Yield the keys of the table and of nested tables, section by section, each with its name."""
         always = [key for allowed in self.alternatives.values() if isinstance(allowed, tuple) for key in allowed]
         keys = (*self.keys, *always)
         yield name, keys
@@ -84,7 +84,7 @@ class Table(Struct, frozen=True, dict=True):
 
 
 class Naming(Struct, frozen=True):
-    """Legal names: the pattern of a whole name, and the same in words, to follow `use`."""
+    """Legal names: the pattern of a whole name, and its description, which follows `use`."""
 
     pattern: re.Pattern[str]
     words: str
@@ -110,7 +110,7 @@ class MapOf(Struct, frozen=True):
 
 
 class Recursive(Struct, frozen=True):
-    """A table, or a value of a type in its place; `itself` says that it is the table of the whole file."""
+    """A table, or a value of a type in its place; `itself` means that it is the table of the whole file."""
 
     type: Any
     table: Callable[[], Table]
@@ -118,18 +118,18 @@ class Recursive(Struct, frozen=True):
 
 
 Type: TypeAlias = "Table | MapOf | Recursive | Any"
-"""What a key takes: a mapping, or a value of an annotation."""
+"""The type of a key's values: a mapping, or an annotation."""
 
 
 def brief(type: Type) -> str:
-    """Return a type in a word or two for a table."""
+    """Return a short description of a type."""
     if isinstance(type, Table | MapOf):
         return "mapping"
     return typecheck.brief(type.type if isinstance(type, Recursive) else type)
 
 
 def plain(value: Value, type: Type) -> Any:
-    """Return a validated value as plain Python, as its type converts it; null is left out of mappings."""
+    """Convert a validated value to plain Python by its type; nulls are left out of mappings."""
     if isinstance(type, Recursive):
         type = type.table() if isinstance(value.data, dict) and not type.itself else Any
     if not isinstance(type, Table | MapOf):
@@ -141,7 +141,7 @@ def plain(value: Value, type: Type) -> Any:
     return {name: plain(child, keys[name].type) for name, child in given.items() if name in keys}
 
 
-# --- JSON Schema (draft 07, which is what editors read) --------------------------------------------------------------
+# --- JSON Schema (draft 07, which editors support) --------------------------------------------------------------
 
 
 def schema(type: Type) -> Schema:
@@ -173,7 +173,7 @@ def file_schema(table: Table) -> Schema:
 
 
 def as_markdown(value: Any) -> Any:
-    """Return a schema that also tells editors which show Markdown to do so, where a description uses it."""
+    """Return a schema that also has descriptions as Markdown, for editors that show it."""
     if isinstance(value, list):
         return [as_markdown(part) for part in value]
     if not isinstance(value, dict):
@@ -227,7 +227,7 @@ def _properties(keys: tuple[Key, ...]) -> Schema:
 
 def nullable(values: Schema) -> Schema:
     """Return a schema that also accepts null, which means absent."""
-    if "oneOf" in values:  # of which null would be each
+    if "oneOf" in values:  # `oneOf` must match null exactly once
         return {"anyOf": [values, {"type": "null"}]}
     if "anyOf" in values:
         return {**values, "anyOf": [*values["anyOf"], {"type": "null"}]}

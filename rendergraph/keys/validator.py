@@ -1,4 +1,4 @@
-"""One pass over a file: unknown keys and values that do not fit are reported with their places and left out."""
+"""Validate a file: report unknown keys and values that do not fit, with their places, and leave them out."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from rendergraph.keys.tables import Key, MapOf, Recursive, Table, Type
 from rendergraph.typecheck import conversion_to, hint_for, test_of, words_for
 
 MOST_PROBLEMS = 100
-"""Limit of mistakes: nobody reads more, and finding the nearest name for each of a million takes hours."""
+"""Maximum number of mistakes: finding the nearest name for each of a million would take hours."""
 
 
 class Codes(Struct, frozen=True):
-    """The codes of the mistakes in one kind of file.
+    """The error codes of one kind of file.
 
     Attributes:
         wrong: a value that does not fit, or is missing.
-        file: the whole is not a mapping.
+        file: the file is not a mapping.
     """
 
     unknown: str
@@ -34,11 +34,11 @@ class Validator:
     """Checks the values of one file against tables.
 
     Attributes:
-        dropped: paths of what was left out, so that it is not reported as missing.
+        dropped: paths of values that were left out, so that they are not reported as missing.
     """
 
     def __init__(self, codes: Codes, problems: Iterable[Problem] = ()) -> None:
-        """`problems` are those of parsing: values may then be `BROKEN`, which has been reported."""
+        """Start with the problems of parsing; values may be `BROKEN`, which has been reported."""
         self.codes = codes
         self.problems = list(problems)
         self.dropped: set[tuple[str, ...]] = set()
@@ -48,13 +48,13 @@ class Validator:
         self._checks: dict[int, tuple[Callable[[Any], bool], Callable[[Any], Any]]] = {}
 
     def report(self, value: Value, code: str, text: str, *, key: bool = False) -> None:
-        """Note a mistake at a value, or at its key."""
+        """Record a mistake at a value, or at its key."""
         self.problems.append(value.problem(code, text, key=key))
         if len(self.problems) >= MOST_PROBLEMS:
             raise InputError(self.problems)
 
     def file(self, value: Value, table: Table, holds: str) -> Value | None:
-        """Return the valid part of a file's outermost value; `holds` says in words what a file usually has."""
+        """Return the valid part of a file's root; `holds` describes what a file usually has."""
         if isinstance(value.data, dict):
             return self._table(value, table, "")
         if value.data is not BROKEN:
@@ -62,7 +62,7 @@ class Validator:
         return None
 
     def value(self, value: Value, key: Key) -> Value | None:
-        """Return the valid part of a key's value; None where nothing of it is valid, or it is null."""
+        """Return the valid part of a key's value; None if nothing of it is valid, or it is null."""
         return self._value(value, key, key.type, key.name)
 
     def _value(self, value: Value, key: Key, type: Type, name: str) -> Value | None:
@@ -92,10 +92,10 @@ class Validator:
         if check is None:
             self._checks[id(type)] = check = test_of(type), conversion_to(type)
         test, convert = check
-        return test(value) or test(convert(value))  # most values fit as they are
+        return test(value) or test(convert(value))  # most values fit without conversion
 
     def _enter(self, valid: dict[str, Value], name: str, child: Value, key: Key, type: Type) -> None:
-        """Add the valid part of a child to a mapping, or note that it was left out."""
+        """Add the valid part of a child to a mapping, or record that it was left out."""
         self._path.append(name)
         if child.data is None:
             valid[name] = child

@@ -1,4 +1,4 @@
-"""Types of the values in files, as annotations: see `rendergraph.typecheck`. Null means absent and is of no type."""
+"""Types of values in files, as annotations: see `rendergraph.typecheck`. Null means absent and has no type."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def version(number: int) -> Any:
 
 
 def word(pattern: re.Pattern[str], words: str, short: str = "name") -> Any:
-    """Text that a pattern matches, with its description for messages and for tables."""
+    """Return the type of text that matches a pattern, with its description for messages and tables."""
     return Annotated[str, Matching(pattern), words, Brief(short)]
 
 
 def shipped(names: Callable[[], Mapping[str, Path]]) -> Any:
-    """The name of something shipped, which an editor offers, or the path of a file, which it does not."""
+    """Return the type of the name of something shipped, which editors suggest, or a file's path."""
     path = {"type": "string", "pattern": "[./]"}
     schema = JsonSchema(lambda: {"anyOf": [{"enum": list(names())}, path]})
     return Annotated[TEXT, schema, Brief("name | path")]
@@ -48,7 +48,7 @@ def vector(count: int = 3, low: float = -MOST, high: float = MOST, *, above: boo
 
 
 def color(high: float = MOST, *, alpha: bool = False) -> Any:
-    """Red, green and blue from 0 up, or one number for a grey; with `alpha` a fourth number, 1 by default."""
+    """Return the type of red, green and blue from 0 up, or one number for grey; `alpha` allows a fourth number."""
     three, four = vector(3, 0, high), vector(4, 0, high)
     words = words_for(three, file=True).replace("list of 3", "number or a list of 3" + (" or 4" if alpha else ""), 1)
 
@@ -62,7 +62,7 @@ def color(high: float = MOST, *, alpha: bool = False) -> Any:
 
 
 def scale() -> Any:
-    """A factor for each axis, or one for all."""
+    """Return the type of a factor for each axis, or one for all."""
     uniform = Converted(lambda value: (value,) * 3 if isinstance(value, float) else value)
     return Annotated[number() | vector(), "a number or a list of 3 numbers", Brief("number | [x, y, z]"), uniform]
 
@@ -72,5 +72,5 @@ def row(*types: Any) -> Any:
 
 
 def listed(of: Any, words: str, least: int = 0, most: float = math.inf) -> Any:
-    """A list; `words` says of what, in the plural."""
+    """Return the type of a list; `words` describes its elements, in the plural."""
     return Annotated[list[of], Length(least, most), f"a list of {words}"]

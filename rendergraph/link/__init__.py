@@ -1,4 +1,4 @@
-"""PipelineSpec to Graph: types found, parameters checked, ports connected, textures worked out; all errors at once."""
+"""Link a PipelineSpec into a Graph: find types, check parameters, connect ports, infer textures; gather all errors."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def link(
     Args:
         lights: the scene's lights in its order; sizes and layers may depend on them.
         objects: the scene's objects; None without a scene, where any may exist.
-        scene_data: called if some node reads the scene's data, with whether rays are traced in it.
+        scene_data: called if a node reads the scene's data, with whether rays are traced in it.
     """
     given = None if objects is None else tuple(objects)
     scene = environment, scene_data, tuple(materials), camera
@@ -57,7 +57,7 @@ def link(
 def sketch(
     spec: PipelineSpec, catalog: Catalog, lights: Sequence[LightFacts] = (), environment: TextureDesc | None = None
 ) -> tuple[Graph, tuple[Problem, ...]]:
-    """Return a graph to look at, although node types are missing, and the problems that say so."""
+    """Return a graph for display, in which node types may be missing, and the problems about these."""
     try:
         return link(spec, catalog, lights, environment=environment), ()
     except InputError as error:
@@ -78,7 +78,7 @@ def fitting(
 ) -> dict[str, dict[str, list[str]]]:
     """Return for each input of each node the links that fit it, by id and name; for a group of inputs, ids of nodes.
 
-    A file with mistakes is answered as far as it can be linked.
+    A file with mistakes is linked as far as possible.
     """
     given = None if objects is None else tuple(objects)
     linker = _Linker(spec, spec.catalog or catalog, tuple(lights), given, environment, sketching=True)
@@ -93,7 +93,7 @@ def fitting(
         for name, port in draft.inputs.items():
             fit = {text: end for text, end in others.items() if checker.fits(draft, port, end)}
             meant = [text for text, end in fit.items() if checker.textures[end].semantic.name != "any"]
-            links[name] = meant or [*fit]  # what may mean anything fits everywhere, but is rarely looked for
+            links[name] = meant or [*fit]  # `any` fits everywhere, but is rarely what is wanted
         for group, members in draft.type.cls.groups().items():
             needed = [name for name in members if not draft.inputs[name].optional] or members
             ids = dict.fromkeys(text.rpartition(".")[0] for text in others)
@@ -126,7 +126,7 @@ def endpoint(graph: Graph, text: str) -> Endpoint:
     if found not in graph.textures:
         raise InputError(Problem("RG112", f"node '{node}' has no output '{port}'{suggestion(port, ports)}"))
     if not graph.textures[found].holds_values:
-        raise InputError(Problem("RG129", f"'{text}' holds no texture, there is nothing to show"))
+        raise InputError(Problem("RG129", f"'{text}' holds no texture; there is nothing to show"))
     return found
 
 
@@ -229,10 +229,10 @@ class _Linker(Struct, eq=False):
         for node in self.spec.nodes.values():
             value = node.value.get("type")
             if not node.type or value is None:
-                continue  # said by resolve
+                continue  # reported by `resolve`
             try:
                 if node.type not in self.catalog:
-                    from rendergraph.link.instances import unknown_type  # where one is missing alone
+                    from rendergraph.link.instances import unknown_type  # only for missing types
 
                     raise InputError(value.problem("RG102", unknown_type(self.spec, self.catalog, node.type)))
                 found[node.id] = self.catalog.get(node.type)
@@ -242,7 +242,7 @@ class _Linker(Struct, eq=False):
                     self.problems += error.problems
                 failed.add(node.type)
                 if self.sketching:
-                    from rendergraph.link.instances import stand_in  # where one is missing alone
+                    from rendergraph.link.instances import stand_in  # only for missing types
 
                     found[node.id] = stand_in(self.spec, node)
                 elif len(self.problems) >= MOST_PROBLEMS:
@@ -279,7 +279,7 @@ class _Linker(Struct, eq=False):
     def _textures(
         self, order: Iterable[str], nodes: Mapping[str, UnlinkedNode], infer: TextureInference
     ) -> dict[Endpoint, TextureInfo]:
-        """In this order a rule rarely has to look further up."""
+        """Return the properties of all ports; in this order, rules rarely recurse upstream."""
         textures: dict[Endpoint, TextureInfo] = {}
         for name in order:
             for end in output_ends(nodes[name]):
@@ -336,7 +336,7 @@ class _Linker(Struct, eq=False):
                     self.warnings.append(found.value.problem("RG154", text).as_warning())
 
     def _warn_of_unused_settings(self, nodes: Mapping[str, UnlinkedNode]) -> None:
-        """Only for typed settings: the parameters of a file may be meant for other scenes."""
+        """Warn only about settings that were typed: the parameters of a file may be meant for other scenes."""
         for draft in nodes.values():
             for name, value in draft.spec.params.items():
                 parameter = draft.type.cls.parameters().get(name) if value.source.path is None else None
@@ -381,7 +381,7 @@ def _links(nodes: Mapping[str, UnlinkedNode]) -> dict[tuple[str, str, Endpoint],
 
 
 def _in_order(problems: Sequence[Problem]) -> list[Problem]:
-    """Each once, by file as first met and by line."""
+    """Return each problem once, sorted by file, in the order of their first problems, and by line."""
     origins: dict[str | Option | None, int] = {}
     for problem in problems:
         origins.setdefault(problem.place.origin if problem.place else None, len(origins))

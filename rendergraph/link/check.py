@@ -1,4 +1,4 @@
-"""Whether the two ends of each link agree, and the textures of a pass among themselves."""
+"""Check that the two ends of each link agree, and the sizes of each pass's textures."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Checker(Struct, eq=False):
             for name, links in draft.links.items():
                 for link in links:
                     info = self.textures.get(link.source.now)
-                    # What a node makes that has lost its source may be of another kind than it would be.
+                    # The output of a node that has lost its source may differ from what it would be.
                     if info is not None and not self.nodes[link.source.node].lost_links:
                         self._link(draft, draft.inputs[name], link, info)
             if len(self.problems) == before:
@@ -77,7 +77,7 @@ class Checker(Struct, eq=False):
         elif given != "view" and (wrong := _semantics(port.semantic, info.semantic)):
             yield wrong
         elif isinstance(port, Input) and info.desc is not None:
-            if port.use != "depth_test":  # attached, not sampled: what is drawn beside it follows
+            if port.use != "depth_test":  # attached, not sampled: the other targets take its samples
                 yield from _samples(port, info, info.desc.samples)
             if expected := self._format(draft, port, FORMATS[info.desc.format]):
                 yield "RG215", expected, f"has the format {info.desc.format}", None
@@ -91,15 +91,15 @@ class Checker(Struct, eq=False):
         if port.compare and not texel.is_depth:
             return "compares with depth"
         if port.use == "image" and (texel.is_depth or texel.srgb):
-            return "is loaded as an image, so no depth and no sRGB"
+            return "is loaded as an image, which excludes depth and sRGB"
         whole = texel.family in ("uint", "int") and not port.compare
-        if whole and port.wrap == "border":  # its value is a float
-            return "has a border, so no whole numbers"
+        if whole and port.wrap == "border":  # a border's value is a float
+            return "has a border, which excludes integers"
         named = isinstance(port.semantic, Semantic) and port.semantic.name != "any"
         if whole and named and draft.type.cls.__module__.startswith("rendergraph."):  # as shipped shaders declare it
-            return "reads no whole numbers"
+            return "does not read integers"
         filtered = whole and self.infer.sampler(draft, port).filter != "nearest"
-        return "is filtered, so no whole numbers" if filtered else ""
+        return "is filtered, which excludes integers" if filtered else ""
 
     def _report(self, draft: UnlinkedNode, port: Input | InOut, link: Link, mismatch: _Mismatch) -> None:
         code, expected, given, converts = mismatch
@@ -111,7 +111,7 @@ class Checker(Struct, eq=False):
         if not way and code == "RG216":
             way = '; a node that can read other sizes declares the input with size="any"'
         if not way and port.kind == "scene":
-            way = "; leave it out, and it reads the scene of the pipeline"
+            way = "; leave the link out to read the scene of the pipeline"
         if not way and code == "RG201":
             way = self._fitting(port, link, [other for other in self.nodes.values() if other is not draft])
         self.problems.append(link.value.problem(code, text + way))
@@ -160,7 +160,7 @@ class Checker(Struct, eq=False):
         """Suggest node types that convert; only here are types imported that the file does not use."""
         found = []
         for name in self.catalog.names() if accepts else ():
-            with suppress(InputError):  # a broken plugin is no way out
+            with suppress(InputError):  # do not suggest a broken plugin
                 found += [f"'{name}'"] if accepts and accepts(self.catalog.get(name).cls) else []
         return f"; {' or '.join(found[:3])} between them would convert" if found else ""
 

@@ -1,4 +1,4 @@
-"""Links of a node's inputs: one by one, several at one input, or a group to the ports of one node."""
+"""Connect a node's inputs: single links, several at one input, or a group to the ports of one node."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class Connector(Struct, eq=False):
                 draft.links[name].append(found)
 
     def _group(self, draft: UnlinkedNode, group: str, members: Sequence[str], value: Value) -> None:
-        """Connect every member that has no link of its own to the port of its name."""
+        """Connect every member that has no link of its own to the port of the same name."""
         missing = [name for name in members if name not in draft.spec.inputs]
         if value.data is None:
             return
@@ -125,7 +125,7 @@ class Connector(Struct, eq=False):
                 kind = getattr(candidate, "kind", port.kind)
                 if wanted is not None and meant is not None and (meant.name, kind) == (wanted.name, port.kind):
                     found.append((name, f"'{other.id.removeprefix(other.scope)}.{name}'"))
-        if found:  # one of the input's own name is what is usually meant
+        if found:  # the port with the input's own name is usually meant
             best = [end for name, end in found if name == port.name] or [end for _, end in found]
             return f"; {' or '.join(best[:3])} would fit"
         what = f"{wanted.name}()" if isinstance(wanted, Signature) else wanted.name if wanted else "anything"

@@ -1,4 +1,4 @@
-"""What linking makes: a graph of typed nodes and edges."""
+"""The result of linking: a graph of typed nodes and edges."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Graph(Struct, frozen=True, dict=True):
         disabled: nodes that `enabled: false` removes; they are not members.
         knows_objects: False without a scene, where any may exist.
         unlit: nodes that need an environment where the scene has none; they are not members either.
-        overwritten: what is wrong if a reader, the first of two nodes, cannot run between the steps of the second.
+        overwritten: by reader and writer, the problem if the reader cannot run between the writer's steps.
         cyclic: where nodes form a cycle, though their steps need not: each link by its reader, input and source.
     """
 
@@ -91,7 +91,7 @@ class Graph(Struct, frozen=True, dict=True):
 
     @property
     def summary(self) -> str:
-        """What `check` says about it."""
+        """The line that `check` prints about it."""
         links = sum(len(ends) for node in self.nodes for ends in node.inputs.values())
         width, height = self.size
         return (
@@ -128,7 +128,7 @@ class Graph(Struct, frozen=True, dict=True):
     @cached_property
     def dag(self) -> nx.MultiDiGraph[str]:
         """The graph in networkx, frozen: nodes have `node`, edges `source_port`, `target_port` and `previous`."""
-        import networkx as nx  # takes longer than checking a pipeline
+        import networkx as nx  # importing it takes longer than checking a pipeline
 
         dag: nx.MultiDiGraph[str] = nx.MultiDiGraph()
         for name, node in self.members.items():
@@ -141,7 +141,7 @@ class Graph(Struct, frozen=True, dict=True):
         return dag
 
     def reading_order(self) -> list[str]:
-        """Return node ids behind what they read in this frame, as far as they form no cycle."""
+        """Return node ids in topological order of this frame's links, as far as they form no cycle."""
         sources = {
             name: {end.node: None for ends in node.inputs.values() for end in ends if not end.previous}
             for name, node in self.members.items()
@@ -151,7 +151,7 @@ class Graph(Struct, frozen=True, dict=True):
 
 
 def depth_first(sources: Mapping[T, Iterable[T]], roots: Iterable[T] | None = None) -> list[T]:
-    """Return names, or roots with all that lies upstream, behind their sources, but for links that close a cycle."""
+    """Return names, or `roots` and all names upstream, each after its sources; links that close a cycle are ignored."""
     order: list[T] = []
     begun: set[T] = set()
     for name in sources if roots is None else roots:
@@ -170,7 +170,7 @@ def depth_first(sources: Mapping[T, Iterable[T]], roots: Iterable[T] | None = No
 
 
 def upstream_first(sources: Mapping[T, Collection[T]]) -> list[T]:
-    """Sort names behind their sources, else in the given order; leaves out cycles and everything downstream of them."""
+    """Sort names topologically, otherwise in the given order; omit cycles and everything downstream of them."""
     place = {name: number for number, name in enumerate(sources)}
     readers: dict[T, list[T]] = {name: [] for name in sources}
     for name, found in sources.items():

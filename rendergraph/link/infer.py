@@ -1,7 +1,7 @@
-"""What every texture turns out to be: sizes, formats, layers, views, by the rules nodes declare.
+"""Infer the size, format, layers and view of every texture from the rules that nodes declare.
 
-Rules are asked on demand and each once, so that a rule may look at what is connected to its node, whichever way round
-the nodes stand in the file, and `@previous` needs no special order.
+Each rule is evaluated once, on demand. So a rule may look at what is connected to its node, whatever the order of nodes
+in the file, and `@previous` needs no special order.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class TextureInference:
         return self.infos[end]
 
     def known(self, end: Endpoint) -> TextureInfo:
-        """Return the same for a rule that cannot continue without."""
+        """Return the properties for a rule that cannot continue without them."""
         info = self.info(end)
         if info is None:
             raise _Unknown
@@ -179,7 +179,7 @@ class TextureInference:
         return found
 
     def _rule_value(self, end: Endpoint, what: str, rule: Callable[[Node, Facts], Any]) -> Any:
-        """Ports that share a function share its result."""
+        """Return the result of a rule; ports that share a function share its result."""
         key = end.node, id(rule)
         if key not in self._answers:
             self._answers[key] = self._call_rule(end, what, rule)
@@ -191,12 +191,12 @@ class TextureInference:
             return rule(draft.node, self._facts_of(draft))
         except _Unknown:
             raise
-        except BaseException as error:  # a stranger's function
+        except BaseException as error:  # third-party code
             if is_interruption(error):
                 raise
             missing = isinstance(error, KeyError) and bool(error.args) and error.args[0] in draft.inputs
             if missing and (end not in self.used or not draft.inputs[error.args[0]].optional):
-                raise _Unknown from None  # nobody uses what lacks an input, or that it must have it is said
+                raise _Unknown from None  # the port is unused, or the missing input is reported elsewhere
             if missing:
                 self._report(end, "RG212", f"its {what} needs input '{error.args[0]}', which is not connected")
             elif isinstance(error, SceneError):
@@ -207,7 +207,7 @@ class TextureInference:
             raise _Unknown from None
 
     def _refused(self, draft: UnlinkedNode, error: SceneError) -> None:
-        """A rule's own complaint, at the parameter it names; several rules may raise the same."""
+        """Report a rule's own error at the parameter it names, once: several rules may raise the same."""
         value, key = draft.spec.value, True
         for param in draft.spec.params.values():
             for part in param.data if isinstance(param.data, list) else [param]:
@@ -236,7 +236,7 @@ class TextureInference:
         if like is not None:
             view, lights = view or like.view, lights or like.lights
         if drawing_view is not None and desc.size == self._view_size(drawing_view):
-            view = str(drawing_view)  # texel by texel what was drawn with it
+            view = str(drawing_view)  # its texels correspond to those drawn with this view
         return TextureInfo(desc, semantic, view, lights)
 
     def _linked(self, draft: UnlinkedNode, name: str | None) -> TextureInfo | None:
@@ -296,7 +296,7 @@ class TextureInference:
                 base = self._view_size(drawing_view)
         width, height = base if factor == 1.0 else [max(1, math.ceil(side * factor - 1e-9)) for side in base]
         if not (1 <= width <= MOST_SIDE and 1 <= height <= MOST_SIDE):
-            self._stop(end, "RG207", f"its size is {width}×{height}, width and height go from 1 to {MOST_SIDE}")
+            self._stop(end, "RG207", f"its size is {width}×{height}; width and height must be from 1 to {MOST_SIDE}")
         return width, height
 
     def _drawing_view(self, draft: UnlinkedNode) -> Endpoint | None:
@@ -307,7 +307,7 @@ class TextureInference:
                 continue
             for link in links:
                 if self.before is not None and draft.spec.id in self.before[link.source.node]:
-                    continue  # which may be sized like what is asked for
+                    continue  # its size may depend on the one in question
                 info = self.info(link.source) if not link.source.previous else None
                 if info is None or info.view is None or info.view == CAMERA:
                     continue

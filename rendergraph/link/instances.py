@@ -42,7 +42,7 @@ def instance(spec: NodeSpec, node_type: NodeType, source_roots: Mapping[Source, 
                 del values[name]
     try:
         return cls(**values), problems
-    except BaseException as error:  # its own check is the author's code
+    except BaseException as error:  # a node's own check is third-party code
         if is_interruption(error):
             raise
         unfit = dict(_unfit(spec, parameters, values))

@@ -99,7 +99,7 @@ class References(Struct, eq=False):
         return value.problem("RG109", f"there is no node '{name}'{hint}")
 
     def nodes_of(self, scope: str) -> list[str]:
-        """Names that can be linked to in a scope, at most 500: the nearest name is searched among them."""
+        """Return at most 500 names that can be linked to in a scope, for suggestions."""
         names = [node.id for node in self.spec.nodes.values() if node.scope == scope]
         names += [inside[:-1] for inside, found in self.spec.scopes.items() if found.parent == scope]
         return [name.removeprefix(scope) for name in names[:500]] + (["inputs"] if scope else [])
@@ -148,7 +148,7 @@ class References(Struct, eq=False):
         if given is None or given.data is None:
             if flag(found.inputs[port], "optional"):
                 return None
-            raise InputError(())  # said at the node
+            raise InputError(())  # reported at the node
         if isinstance(given.data, list):
             text = f"'{scope[:-1]}.{port}': expected one link as in node.port, got a list"
             raise InputError(given.problem("RG113", text))

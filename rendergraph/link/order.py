@@ -1,4 +1,4 @@
-"""Cycles, and who may read and write the versions of a texture."""
+"""Check for cycles, and that the versions of a texture are written and read in a possible order."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def cycles(nodes: Mapping[str, UnlinkedNode]) -> list[Problem]:
     An output certainly waits for every input of a node without `record`, and for the input that it continues or is
     `like`.
     """
-    import networkx as nx  # for the message of a mistake alone
+    import networkx as nx  # only for an error message
 
     links: dict[tuple[Endpoint, Endpoint], tuple[str, Link]] = {}
     for draft in nodes.values():
@@ -49,7 +49,7 @@ def cycles(nodes: Mapping[str, UnlinkedNode]) -> list[Problem]:
         if len(names) > 8:
             names[3:-3] = [f"{len(names) - 6} more"]
         text = (
-            f"the nodes form a cycle, {' → '.join([*names, names[0]])}; '@previous' behind one reads last frame's value"
+            f"the nodes form a cycle, {' → '.join([*names, names[0]])}; append '@previous' to read last frame's value"
         )
         found.append(value.problem("RG117", text))
     return found
@@ -86,7 +86,7 @@ def versions(nodes: Mapping[str, UnlinkedNode]) -> tuple[list[Problem], dict[tup
     """Check that each version has one writer (`InOut`), after all its readers; outputs keep their version.
 
     Returns:
-        What is wrong, and what is by reader and writer if the steps of that writer cannot run around the reader.
+        The problems; and, by reader and writer, those that apply if the reader cannot run between the writer's steps.
     """
     writers: dict[Endpoint, tuple[UnlinkedNode, Link]] = {}
     problems: list[Problem] = []

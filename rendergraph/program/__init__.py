@@ -1,15 +1,15 @@
-"""One step's program as text, and a driver's messages about it. No GL.
+"""One step's program as text, and the driver's messages about it. No GL.
 
-`stage_texts` makes the text of each stage; the driver's answers go through `messages.compile_problems` and
-`messages.link_problems`.
+`stage_texts` generates the text of each stage; `messages.compile_problems` and `messages.link_problems` translate the
+driver's messages.
 
-A stage's text is, in this order: version, `#extension` lines, macros, `<view.glsl>`, views and light tables of the
-textures read; for each function that the stage calls, its providers' texts and the function that joins them; the
-author's file. Names of a provider's text are `prefix(node id) + name`: its textures (`shadows_shadow_map`), uniforms
-(`shadows_bias`), view blocks (`shadows_shadow_map_view_block`). The step's own texture reads keep their names, with
-`<name>_view_block` for the views. A block or table that the text does not use is not declared. A shader that mentions
-`SHADOW_LIGHT_COUNT` gets it and, if it is not 0, the table `shadow_lights` of the lights that some provider of `shadow`
-knows; the same for other functions, by their name.
+A stage's text has, in this order: version, `#extension` lines, macros, `<view.glsl>`, views and light tables of its
+input textures; for each function that the stage calls, its providers' texts and the function that combines them; the
+author's file. Names in a provider's text get a prefix, `prefix(node id) + name`: its textures (`shadows_shadow_map`),
+uniforms (`shadows_bias`), view blocks (`shadows_shadow_map_view_block`). The step's own textures keep their names, with
+`<name>_view_block` for the views. Unused blocks and tables are not declared. A shader that mentions
+`SHADOW_LIGHT_COUNT` gets it and, if it is not 0, the table `shadow_lights` of the lights that any provider of `shadow`
+knows; the same holds for other functions, by their name.
 """
 
 from __future__ import annotations

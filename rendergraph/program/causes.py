@@ -1,4 +1,4 @@
-"""The causes among a driver's messages about one stage: a misspelt name is one mistake, whatever follows from it."""
+"""Find the causes among a driver's messages about one stage: a misspelt name is one mistake with many consequences."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ _FORMS = (
 _UNKNOWN = re.compile(
     r"undeclared|undefined variable|no function with name|no matching overloaded function", re.IGNORECASE
 )
-"""How drivers say that they do not know a name."""
+"""Drivers' phrases for an unknown name."""
 _QUOTED = re.compile(r"[`'\"]([A-Za-z_]\w*)['\"`]")
 _CALL = re.compile(r"(?P<before>.*`\w+\((?P<types>[^()]*)\)'); candidates are:")
 _CANDIDATE = re.compile(r"\s{3,}\w+ \w+\((?P<types>[^()]*)\)\s*\Z")
 _MOST_CANDIDATES = 3
 _CLOSE = 0.75
 _ENDS = re.compile(r"[;{}]\s*\Z|^\s*#")
-"""Of a line behind which a new statement begins."""
+"""Matches the end of a line after which a new statement begins."""
 _DECLARES = r"^(?:struct\s+{0}\b|#\s*define\s+{0}\b|\w+\s+{0}\s*\()"
-"""A line at which a file declares a struct, a macro or a function of a name."""
+"""Matches a line that declares a struct, a macro or a function with a name."""
 _BUILT_IN = """
 abs acos acosh all any asin asinh atan atanh barrier bitCount bitfieldExtract ceil clamp cos cosh cross dFdx
 dFdxCoarse dFdxFine dFdy dFdyCoarse dFdyFine degrees determinant distance dot equal exp exp2 faceforward findLSB
@@ -46,7 +46,7 @@ trunc uintBitsToFloat unpackHalf2x16 unpackUnorm4x8 gl_FragCoord gl_FragDepth gl
 gl_InstanceID gl_Layer gl_LocalInvocationID gl_LocalInvocationIndex gl_NumWorkGroups gl_Position gl_PrimitiveID
 gl_SampleID gl_VertexID gl_WorkGroupID EmitVertex EndPrimitive
 """
-"""Names of GLSL 4.50 that are misspelt most."""
+"""Common names of GLSL 4.50, for suggestions."""
 
 
 class DriverMessage(Struct, frozen=True):
@@ -61,8 +61,8 @@ class DriverMessage(Struct, frozen=True):
 def causes(rows: Sequence[str], source: SourceText) -> list[DriverMessage]:
     """Return the messages that name a line, without consequences of others; warnings only if there is no error.
 
-    Of a statement only the first error counts, and unknown names. Such a name is reported once, with a near one; of the
-    candidates for a call only the nearest are listed.
+    For each statement, only the first error and unknown names count. An unknown name is reported once, with a similar
+    one; only the closest candidates for a call are listed.
     """
     found = list(_with_candidates([message for row in rows if (message := _read(row)) is not None]))
     errors = [message for message in found if not message.is_warning]
@@ -99,7 +99,7 @@ def _read(row: str) -> DriverMessage | None:
 
 
 def _with_candidates(found: Sequence[DriverMessage]) -> Iterator[DriverMessage]:
-    """Join the overloads that Mesa lists beneath a call, one message each, to the message about the call."""
+    """Append the overloads that Mesa lists beneath a call, one message each, to the message about the call."""
     at = 0
     while at < len(found):
         message = found[at]
@@ -119,9 +119,9 @@ def _with_candidates(found: Sequence[DriverMessage]) -> Iterator[DriverMessage]:
 
 
 def _distance(types: str, candidate: str) -> tuple[int, int, list[bool]]:
-    """Return how far a candidate is from the call: by the number of arguments, then by those that differ."""
+    """Return the distance of a candidate from the call: by argument count, then by differing arguments."""
     match = _CANDIDATE.match(f"   {candidate}")
-    assert match  # it was listed for that
+    assert match  # candidates match by construction
     given, taken = types.split(", "), match["types"].split(", ")
     differ = [one != other for one, other in zip(given, taken, strict=False)]
     return abs(len(given) - len(taken)), sum(differ), differ
@@ -145,7 +145,7 @@ def _near(text: str, known: set[str]) -> str:
 
 
 def _unknown_type(source: SourceText, line: int) -> str:
-    """Explain Mesa's word for a name that nothing declares, where it expects a type or has taken one for a value."""
+    """Explain Mesa's message about an undeclared name, where it expects a type or has taken one for a value."""
     for name in re.findall(r"[A-Za-z_]\w*", source.lines[line - 1]) if line <= len(source.lines) else ():
         if not re.search(_DECLARES.format(name), source.text, re.MULTILINE) and (include := _include_with(name)):
             return f": nothing declares '{name}'; #include <{include}> does"
@@ -153,7 +153,7 @@ def _unknown_type(source: SourceText, line: int) -> str:
 
 
 def _include_with(name: str) -> str:
-    """Return the shared include that declares a function, struct or macro of that name, empty if none does."""
+    """Return the shared include that declares a function, struct or macro with that name; empty if none does."""
     for file in sorted(shared_includes().glob("*.glsl")):
         if re.search(_DECLARES.format(name), file.read_text(encoding="utf-8"), re.MULTILINE):
             return file.name

@@ -1,4 +1,4 @@
-"""A step's program text compared with what the step provides, as far as possible without GL."""
+"""Compare a step's program text with what the step provides, as far as possible without GL."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from rendergraph.steps import Read, Resource, Step
 from rendergraph.textures import FORMATS, GLSL_SHAPES, TextureDesc
 
 _PASSED: FileCache[tuple[Problem, ...]] = FileCache()
-"""The warnings about texts in which nothing was wrong."""
+"""The warnings about texts without errors."""
 Texts = Callable[[], Mapping[str, StageText]]
-"""A program's texts, put together where they are looked at."""
+"""Returns a program's texts, generated on demand."""
 
 _MOVING = {
     "camera_block": "the camera",
     "frame_block": "the frame's time and number",
     "light_block": "the scene's lights, which may move",
     "material_block": "the scene's materials, which may change",
-    "environment_block": "how bright the environment is and how it is turned, which may move",
+    "environment_block": "the intensity and rotation of the environment, which may change",
     "pass_view_block": "the view it is drawn with",
-    "scene_previous_block": "where the objects were in the frame before",
+    "scene_previous_block": "the transforms of objects in the previous frame",
 }
 _OF_SCENE_DATA = ("light_block", "material_block")
 _OF_SCENE = ("scene.glsl", "previous_scene.glsl", "trace.glsl")
@@ -81,7 +81,7 @@ def _check_step(
 
 
 def missing(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> list[Problem]:
-    """Return what the shaders of a step use and nothing provides as declared, at the lines of the shaders."""
+    """Return problems about names that a step's shaders use but nothing provides, at the lines of the shaders."""
     return [_placed(problem, text, [name]) for text, name, problem in unbound(step, texts, cls)]
 
 
@@ -116,7 +116,7 @@ def unfit_sampler(step: Step, declared: str, read: Read, resources: Mapping[str,
     if desc.samples > 1 and declared == right.replace("MS", ""):
         text = (
             f"'{read.name}' is read as one sample per texel ({declared}), but '{read.resource}' has {desc.samples} "
-            f"samples; resolve it before, or declare it as {right}"
+            f"samples; resolve it first, or declare it as {right}"
         )
         return step.problem("RG214", text)
     what = f"a {read.kind} of {desc.format}" + (f" with {desc.samples} samples" if desc.samples > 1 else "")
@@ -131,7 +131,7 @@ def _check_samplers(step: Step, texts: Mapping[str, StageText], resources: Mappi
     for text in texts.values():
         for name, kinds in declared_samplers(text.text).items():
             found = [unfit_sampler(step, kind, reads[name], resources) for kind in kinds] if name in reads else [None]
-            if found[0] is not None and None not in found:  # a branch of an `#if` may declare the right type
+            if found[0] is not None and None not in found:  # another branch of an `#if` may declare the right type
                 problems.append(_placed(found[0], text, [name]))
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
@@ -142,7 +142,7 @@ def unfit_outputs(
 ) -> list[Problem]:
     """Return the problems of a fragment shader's outputs, given as name to GLSL type.
 
-    Each is a target of the step or a port of the node; a single one may have any name.
+    Each must be a target of the step or a port of the node; a single output may have any name.
     """
     problems = []
     targets = {write.name: write.resource for write in step.writes if write.use == "color"}
@@ -167,7 +167,7 @@ def _check_outs(step: Step, texts: Mapping[str, StageText], cls: type[Node], res
     """Check the outputs that a text always declares; an `out` inside `#if` belongs to another step or variant."""
     if "fragment" in texts:
         text = texts["fragment"]
-        parts = [part for part in re.split("[;{}]", _always(text.text)) if "out" in part]  # the rest takes long to read
+        parts = [part for part in re.split("[;{}]", _always(text.text)) if "out" in part]  # parsing the rest takes long
         declared = globals_of(";\n".join([*parts, ""])).declared
         outs = {found.name: found.type for found in declared if found.storage == "out"}
         problems = unfit_outputs(step, outs, cls, resources)
@@ -181,7 +181,7 @@ def _traces(step: Step, types: Mapping[str, NodeType]) -> bool:
 
 
 def ray_warnings(steps: Iterable[Step], types: Mapping[str, NodeType]) -> Iterator[Problem]:
-    """Yield warnings about what rays miss: vertices that a plugin moves (RG625), and narrow highlights (RG626)."""
+    """Yield warnings about what ray tracing misses: vertices that a plugin moves (RG625), narrow highlights (RG626)."""
     traced = [step for step in steps if _traces(step, types)]
     for step in steps if traced else ():
         vertex = dict(step.shaders).get("vertex", "<")
@@ -195,7 +195,7 @@ def ray_warnings(steps: Iterable[Step], types: Mapping[str, NodeType]) -> Iterat
 
 
 def check_scene_includes(step: Step, texts: Mapping[str, StageText], types: Mapping[str, NodeType]) -> None:
-    """Refuse includes about the scene's data in steps that do not read it (RG430)."""
+    """Refuse includes for the scene's data in steps that do not read it (RG430)."""
     traces, problems = _traces(step, types), []
     for text in texts.values():
         for block in text.source.blocks:
@@ -218,7 +218,7 @@ def check_scene_includes(step: Step, texts: Mapping[str, StageText], types: Mapp
 
 
 def _always(text: str) -> str:
-    """Return a text without what is inside `#if`."""
+    """Return a text without the contents of `#if`."""
     depth, kept = 0, []
     for line in text.split("\n"):
         directive = re.match(r"\s*#\s*(ifdef|ifndef|if|endif)\b", line) if "#" in line else None
@@ -241,10 +241,10 @@ def check_kept_text(step: Step, texts: Texts, cls: type[Node], resources: Mappin
             problems.append(_placed(problem, text, [name]))
         for _, block, members in blocks:
             used = sorted(names & members)
-            follows = step.reads_scene and block in _OF_SCENE_DATA  # it runs again where those change
+            follows = step.reads_scene and block in _OF_SCENE_DATA  # the step runs again when those change
             if used and not follows and (block in _MOVING or block.endswith("_view_block")):
                 what = _MOVING.get(block, "a view, which `update` sets in each frame")
-                problem = step.problem("RG439", f"it makes '{kept}', which is kept, but looks at {what} ('{used[0]}')")
+                problem = step.problem("RG439", f"it makes '{kept}', which is kept, but uses {what} ('{used[0]}')")
                 problems.append(_placed(problem, text, used))
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
@@ -265,7 +265,7 @@ used_names = lru_cache(maxsize=256)(reachable_names)
 
 @lru_cache(maxsize=256)
 def used_blocks(text: str) -> frozenset[str]:
-    """Return the blocks of which `main` of a program text, or what it calls, uses a member."""
+    """Return the blocks of which `main` of a program text, or a function that it calls, uses a member."""
     names = used_names(text)
     return frozenset(block for _, block, members in declared_blocks(text) if not names.isdisjoint(members))
 

@@ -1,4 +1,4 @@
-"""Images of shaders: their format comes from the port, and may be repeated in the shader.
+"""Image formats in shaders: they come from the port, and may be repeated in the shader.
 
 `uniform writeonly image2D board;` gets the `layout(rgba16f)` of its port; a written layout must agree with it.
 """
@@ -29,7 +29,7 @@ _LAYOUT_FORMATS = {*FORMATS, *_OTHER_FORMATS.split()}
 def with_formats(
     source: SourceText, step: Step, resources: Mapping[str, Resource], macros: Mapping[str, str]
 ) -> SourceText:
-    """Add the port's format to every image that states none (RG427 if they disagree, RG430 if it is no port's)."""
+    """Add the port's format to every image without one (RG427 if they disagree, RG430 if no port belongs to it)."""
     images = dict(_images(step, resources))
     lines, origins = list(source.lines), list(source.origins)
     problems: list[Problem] = []
@@ -65,7 +65,7 @@ def _is_compiled(source: SourceText, macros: Mapping[str, str], match: re.Match[
 
 
 def _unknown(step: Step, match: re.Match[str], images: Collection[str]) -> str:
-    """Drivers ask for a format layout qualifier where the name is wrong."""
+    """Explain a wrong image name, for which drivers only demand a format layout qualifier."""
     files = ", ".join(file for _, file in step.shaders)
     text = f"{files} declares the image '{match['name']}', but the step loads and stores no port of that name"
     hint = suggestion(match["name"], images) if images else ""

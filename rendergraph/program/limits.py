@@ -1,4 +1,4 @@
-"""Compare a plan and its programs with the limits of a device, or with those that OpenGL 4.5 guarantees. No GL."""
+"""Compare a plan and its programs with the limits of a device, or with those guaranteed by OpenGL 4.5. No GL."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _WHO, _MINIMAL = "this device", "a minimal OpenGL 4.5 device"
 
 
 def check_plan(limits: Mapping[str, int], plan: ResourcePlan, views: Mapping[str, ViewTable]) -> None:
-    """Refuse what a device with these limits cannot hold, all of it at once."""
+    """Refuse everything that exceeds a device's limits, in one error."""
     if mistakes := list(dict.fromkeys(_samples(plan, limits))):
         raise InputError(mistakes)
     if problems := list(_excesses(limits, plan, views)):
@@ -59,7 +59,7 @@ def beyond_guaranteed(
 
 
 def program_excesses(stages: Mapping[str, str]) -> Iterator[str]:
-    read: set[str] = set()  # by later stages
+    read: set[str] = set()  # inputs of later stages
     for stage, text in reversed(list(stages.items())):
         names, compiled = reachable_names(text), compiled_text(text)
         samplers = names & declared_samplers(compiled).keys()
@@ -84,7 +84,7 @@ def _components(type: str) -> int:
 
 
 def _samples(plan: ResourcePlan, limits: Mapping[str, int], who: str = _WHO) -> Iterator[Problem]:
-    """Unlike the other limits it is met by what people type: a parameter, at the node that has it."""
+    """Yield textures with too many samples, located at the node, because users set samples by a parameter."""
     for step in plan.schedule.steps:
         for write in step.writes:
             desc = plan.resources[write.resource].desc

@@ -24,8 +24,8 @@ _DECLARES = re.compile(r"\b(?:in|out|inout|uniform|buffer|flat|centroid|const|la
 def compile_problems(message: str, text: StageText) -> list[Problem]:
     """Return a driver's messages about one stage, at places that the author knows.
 
-    Understands the forms of Mesa (`0:12(5): error: …`), NVIDIA (`0(12) : error C1008: …`) and of AMD, Intel and glslang
-    (`ERROR: 0:12: …`). Warnings are dropped if there are errors. A message that names no line becomes one problem.
+    Understands the formats of Mesa (`0:12(5): error: …`), NVIDIA (`0(12) : error C1008: …`) and AMD, Intel and glslang
+    (`ERROR: 0:12: …`). Warnings are dropped if there are errors. A message without a line becomes one problem.
     """
     found = _located(message.splitlines(), text, "RG410")
     if found:
@@ -36,7 +36,7 @@ def compile_problems(message: str, text: StageText) -> list[Problem]:
 
 
 def link_problems(message: str, texts: Mapping[str, StageText]) -> list[Problem]:
-    """Return a driver's messages about stages that do not fit together.
+    """Return a driver's messages about stages that do not link.
 
     NVIDIA names lines under the heading of a stage. Other drivers name a variable: the place is the line that declares
     it, in the later stage if both do; else it is the last stage's file.
@@ -55,7 +55,7 @@ def link_problems(message: str, texts: Mapping[str, StageText]) -> list[Problem]
     last = list(texts.values())[-1]
     text = f"{last.of_node}the stages {', '.join(texts)} do not link: {text}"
     lacking = _LACKS.search(text)
-    if lacking and lacking[1] in texts:  # it names what is not there
+    if lacking and lacking[1] in texts:  # the message names what is missing
         where = _first_place(texts[lacking[1]].source)
         return [Problem("RG411", text, where.place() if where else None)]
     for stage_text in reversed(list(texts.values())):
@@ -67,7 +67,7 @@ def link_problems(message: str, texts: Mapping[str, StageText]) -> list[Problem]
 
 
 def declared_at(source: SourceText, names: Sequence[str], *, mentions: bool = True) -> tuple[Place, str] | None:
-    """Return where an author's file declares one of some names, and that line.
+    """Return where an author's file declares one of the names, and that line.
 
     With `mentions` a line that declares something else with the name counts too, such as a parameter.
     """
@@ -85,7 +85,7 @@ def declared_at(source: SourceText, names: Sequence[str], *, mentions: bool = Tr
 
 
 def mentioned_at(source: SourceText, names: Sequence[str]) -> tuple[Place, str] | None:
-    """Return the first place in an author's file that contains one of some names, and its line."""
+    """Return the first place in an author's file that contains one of the names, and its line."""
     pattern = re.compile(rf"\b(?:{'|'.join(map(re.escape, names))})\b")
     for line, origin in zip(source.lines, source.origins, strict=True):
         match = None if origin.shared else pattern.search(line)
@@ -101,7 +101,7 @@ def _located(rows: Sequence[str], text: StageText, code: str) -> list[Problem]:
 def _problem(code: str, message: DriverMessage, stage: StageText) -> Problem:
     rows, text, line = stage.source, message.text.strip(), message.line
     severity: Literal["error", "warning"] = "warning" if message.is_warning else "error"
-    if not 1 <= line <= len(rows.lines):  # of the whole: that functions call each other, say
+    if not 1 <= line <= len(rows.lines):  # about the whole text, such as recursion
         first = _first_place(rows)
         spot = declared_at(rows, _FUNCTION.findall(text)) or (first.place() if first else None, "")
         return Problem(code, f"{stage.who}: {text}", *spot, severity)
@@ -128,7 +128,7 @@ def _problem(code: str, message: DriverMessage, stage: StageText) -> Problem:
 
 
 def _unsqueezed(line: str, column: int) -> int:
-    """Return the column in a line for one reported by Mesa, whose preprocessor collapses blanks; of the text for none.
+    """Return the column for one reported by Mesa, whose preprocessor collapses blanks; for 0, the column of the text.
 
     Measured with Mesa 22.3: indents, tabs and blanks inside a line alike, and comments, which are blanks already.
     """
@@ -139,7 +139,7 @@ def _unsqueezed(line: str, column: int) -> int:
 
 
 def _of_name(line: str, message: str, column: int) -> int:
-    """Return where a quoted name is, next to the reported column: macros of the line shift that one."""
+    """Return the position of a quoted name closest to the reported column, which macros in the line shift."""
     for name in _QUOTED.findall(message):
         starts = [match.start() + 1 for match in _WORD.finditer(line) if match.group() == name]
         if starts:
@@ -148,7 +148,7 @@ def _of_name(line: str, message: str, column: int) -> int:
 
 
 def _macro(source: SourceText, line: str, message: str) -> tuple[int, str] | None:
-    """Return the macro that contains a quoted name: drivers report the line that uses it, and odd columns."""
+    """Return the macro that contains a quoted name: drivers report the line that uses the macro, and wrong columns."""
     words = [(match.group(), match.start()) for match in _WORD.finditer(line)]
     for name in _QUOTED.findall(message):
         if name in (word for word, _ in words):
@@ -178,7 +178,7 @@ def _first_place(source: SourceText) -> Origin | None:
 
 
 def _nearest_author(source: SourceText, line: str, message: str) -> Origin | None:
-    """Return the first line of an author's file that names what a generated line is about."""
+    """Return the first line of an author's file that contains a name of a generated line."""
     own = [
         (text, origin)
         for text, origin in zip(source.lines, source.origins, strict=True)

@@ -1,4 +1,4 @@
-"""Everything that the text of a step may use, with its origin; and the text annotated with its files."""
+"""Everything that a step's program may use, with its origin; and the program text annotated with its files."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class _Scope:
             values += [(prefix(one.node), one.node, name, value) for name, value in one.uniforms]
         for before, node, name, value in values:
             declaration = types.pop(before + name, None)
-            kind = _type(declaration) if declaration is not None else "…"  # the step's text does not declare it
+            kind = _type(declaration) if declaration is not None else "…"  # not declared in the step's text
             whose = "" if node == self.step.node else f" of '{node}'"
             knob = name in self.types[node].cls.parameters()
             where = f"parameter '{name}'{whose}" if knob else f"the step{whose}"
@@ -213,7 +213,7 @@ class _Scope:
         return f"its own '{port}'{last}" if node == self.step.node else f"{read.resource}{last}"
 
 
-_declared = lru_cache(8)(globals_of)  # a stage's text is asked for its uniforms, inputs and outputs
+_declared = lru_cache(8)(globals_of)  # called for a stage's uniforms, inputs and outputs
 
 
 def _globals(source: SourceText, storage: str) -> Iterator[tuple[Global, Origin]]:

@@ -25,10 +25,10 @@ from rendergraph.textures import SIGNATURES, TEXTURE_KINDS, Signature, TextureDe
 
 VERSION = "#version 450 core"
 _EXTENSION = re.compile(r"\s*#\s*extension\b")
-_IMAGE_TYPE = re.compile(r"uniform\s[^;]*image")  # found quickly without `\b` in front
+_IMAGE_TYPE = re.compile(r"uniform\s[^;]*image")  # faster without a leading `\b`
 _TEXTS: FileCache[dict[str, StageText]] = FileCache(96)
-"""The texts of steps, some 100 KiB each."""
-_MANY_LAYERS = 16  # more layers than this are looked up in a loop instead of one test each
+"""Maximum number of cached texts, about 100 KiB each."""
+_MANY_LAYERS = 16  # with more layers than this, a loop replaces one test per layer
 
 
 class StageText(Struct, frozen=True):
@@ -41,7 +41,7 @@ class StageText(Struct, frozen=True):
 
     @property
     def of_node(self) -> str:
-        """The beginning of messages: `node 'blur': `."""
+        """The prefix of messages: `node 'blur': `."""
         return f"node '{self.node}': " if self.node else ""
 
     @property
@@ -56,8 +56,8 @@ class StageText(Struct, frozen=True):
 def prefix(node: str) -> str:
     """Return the prefix of every name in a function's text: the providing node's id and an underscore.
 
-    Two ids never give the same prefix, nor can a prefixed name be read in two ways: characters that are not letters or
-    digits are escaped with `Z`.
+    Two ids never give the same prefix, and a prefixed name is unambiguous: characters other than letters and digits are
+    escaped with `Z`.
     """
     escapes = {"Z": "ZZ", "_": "Zu", "-": "Zd", "/": "Zs"}
     plain = "".join(letter if letter.isalnum() and letter != "Z" else escapes[letter] for letter in node)
@@ -95,7 +95,7 @@ def stage_texts(
         if stage in shaders:
             try:
                 texts[stage] = program.stage(stage, shaders[stage], includes.fresh())
-            except InputError as error:  # the place of a missing file is the call that names it
+            except InputError as error:  # a missing file is located at the call that names it
                 raise InputError([p if p.place else step.relocate(p) for p in error.problems]) from error
     return texts
 
@@ -104,18 +104,18 @@ _IRRELEVANT: dict[str, Any] = {
     "node": "", "index": 0, "reads": (), "writes": (), "uniforms": (), "functions": (), "label": "", "if_drawn": None,
     "size": (0, 0), "groups": (0, 0, 0), "invocations": None,
 }  # fmt: skip
-"""Fields of a step that do not affect its texts, or only as `text_key` says."""
+"""Fields of a step that do not affect its texts, or only through `text_key`."""
 
 
 def text_key(
     step: Step, types: Mapping[str, NodeType], resources: Mapping[str, Resource], views: Mapping[str, ViewTable]
 ) -> Hashable:
-    """Return all that a step's texts depend on besides files: equal keys give equal texts, even of two graphs."""
+    """Return everything that a step's texts depend on except files: equal keys give equal texts, even in two graphs."""
 
     def seen(use: Read | Write) -> Hashable:
         resource = resources[use.resource]
         count = resource.view and views.get(resource.view, ViewTable()).count
-        desc = resource.desc  # no text contains its size, as `textureSize` and `imageSize` return it
+        desc = resource.desc  # texts do not contain sizes, which `textureSize` and `imageSize` return
         what = (desc.kind, desc.format, desc.layers, desc.samples) if isinstance(desc, TextureDesc) else desc
         return replace(use, resource="", version=0, mip=None), what, resource.lights, count
 
@@ -140,9 +140,9 @@ def text_key(
 
 
 class StepTexts(Struct, eq=False):
-    """Program texts of many steps; steps that differ in nothing a text depends on share one.
+    """Program texts of many steps; steps with equal keys share one.
 
-    They are cached from one pipeline to the next, as long as their files do not change.
+    They are cached across pipelines, as long as their files do not change.
     """
 
     types: Mapping[str, NodeType]
@@ -158,7 +158,7 @@ class StepTexts(Struct, eq=False):
 
 
 class _Program(Struct, frozen=True):
-    """A step with what its program text depends on, as in `stage_texts`."""
+    """A step with everything that its program text depends on, as in `stage_texts`."""
 
     step: Step
     types: Mapping[str, NodeType]
@@ -172,7 +172,7 @@ class _Program(Struct, frozen=True):
         view = SourceText(tuple(SourceBlock(block.lines, replace(block.origin, shared=True)) for block in view.blocks))
         step, node = self.step, self.types[self.step.node]
         file, root = node.shader_file(name, include_folder)
-        # What the file calls decides which functions stand before it, so it is read as if there were none.
+        # The calls in the file decide which functions precede it, so it is expanded without them first.
         versions = node.is_shader and not name.startswith("<")
 
         def expanded(by: Includes) -> SourceText:
@@ -187,7 +187,7 @@ class _Program(Struct, frozen=True):
             if mentions(source.text, f"{signature.name.upper()}_LIGHT_COUNT"):
                 table = self._light_table(signature)
                 functions += generated(table, f"the lights of {signature.name}()")
-        if functions.blocks:  # which may include what it includes
+        if functions.blocks:  # these may have the same includes
             source = expanded(includes)
         uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
         if any(use.use == "image" for use in uses) or _IMAGE_TYPE.search(source.text):
@@ -203,14 +203,14 @@ class _Program(Struct, frozen=True):
         return StageText(stage, head + text, step.node, tuple(warnings))
 
     def _elements(self, body: str) -> SourceText:
-        """Return the structs of the buffers that the step uses, as far as the text names them."""
+        """Return the element structs of the step's buffers that the text names."""
         uses: tuple[Read | Write, ...] = (*self.step.all_reads, *self.step.writes)
         found = [getattr(self.resources[use.resource].desc, "element", None) for use in uses]
         structs = [each.glsl for each in dict.fromkeys(found) if each is not None and mentions(body, each.name)]
         return generated(structs, "the elements of the step's buffers") if structs else SourceText()
 
     def _functions(self, stage: str, signature: Signature, includes: Includes) -> SourceText:
-        """Return the providers' texts with prefixed names, and the functions that join them."""
+        """Return the providers' texts with prefixed names, and the functions that combine them."""
         text = SourceText()
         nodes: list[str] = []
         for binding in self.step.functions:
@@ -233,10 +233,10 @@ class _Program(Struct, frozen=True):
         kind = signature.declaration.split()[0]
         lines += [f"{signature.declaration} {{", f"    {kind} result = {signature.neutral};"]
         lines += [f"    {factor}" for factor in factors]
-        return text + generated([*lines, "    return result;", "}"], f"{signature.name}() of all that provide it")
+        return text + generated([*lines, "    return result;", "}"], f"{signature.name}() of all providers")
 
     def _light_table(self, signature: Signature) -> Iterator[str]:
-        """Yield the lights that some provider or texture of the function knows, for shaders that need them."""
+        """Yield the lights that any provider or texture of the function knows, for shaders that need them."""
         reads = [
             read for binding in self.step.functions if binding.signature == signature.name for read in binding.reads
         ]
@@ -250,7 +250,7 @@ class _Program(Struct, frozen=True):
         return self.resources[read.resource].lights if read.resource in self.resources else ()
 
     def _provider_text(self, binding: FunctionBinding, includes: Includes) -> SourceText:
-        """Return one provider's text with every name it declares, its inputs and its parameters prefixed."""
+        """Return one provider's text with a prefix on every name that it declares, its inputs and its parameters."""
         before, node = prefix(binding.node), self.types[binding.node]
         file, root = node.shader_file(binding.shader)
         plugged = dict(binding.includes)
@@ -299,7 +299,7 @@ def _hoisted(source: SourceText) -> tuple[list[str], SourceText]:
 
 
 def _read_declarations(reads: Iterable[Read], resources: Mapping[str, Resource], before: str, body: str) -> SourceText:
-    """Return views and light tables of the textures read, as far as the text uses them."""
+    """Return the views and light tables of input textures that the text uses."""
     text = SourceText()
     for read in reads:
         resource = resources.get(read.resource)
@@ -314,7 +314,7 @@ def _read_declarations(reads: Iterable[Read], resources: Mapping[str, Resource],
                 f"layout(std140) uniform {before}previous_{read.name}_view_block "
                 f"{{ View {before}previous_{read.name}_views[{macro}_VIEW_COUNT]; }};"
             )
-            text += generated([block], f"the views of '{read.name}' in the frame before")
+            text += generated([block], f"the views of '{read.name}' in the previous frame")
         if resource.lights and mentions(body, f"{name}_lights"):
             table = ", ".join(str(light) for light in resource.lights)
             line = f"const int {name}_lights[{len(resource.lights)}] = int[]({table});"
@@ -323,7 +323,7 @@ def _read_declarations(reads: Iterable[Read], resources: Mapping[str, Resource],
 
 
 def signatures_of(step: Step, types: Mapping[str, NodeType]) -> dict[str, Signature]:
-    """Return every function that the step's shader may call: provided, or declared as an input and so neutral."""
+    """Return every function that the step's shader may call: provided, or declared as an input and then neutral."""
     found = {signature.name: signature for signature in SIGNATURES}
     for binding in step.functions:
         found |= _declared_signatures(types[binding.node])
@@ -400,7 +400,7 @@ def positions_macro(samples: int) -> str:
 def _used_macros(macros: Mapping[str, str], text: str) -> dict[str, str]:
     """Return the macros whose names occur in a text or in the value of such a macro.
 
-    The others would only make different programs of equal ones: a blur is the same for any number of lights.
+    Others would only make equal programs differ: a blur is the same for any number of lights.
     """
     found: dict[str, str] = {}
     texts = [text]

@@ -1,6 +1,6 @@
-"""What a step's shaders use and nothing provides: samplers, views, images and uniforms. No GL.
+"""Find names that a step's shaders use but nothing provides: samplers, views, images and uniforms. No GL.
 
-As far as texts show it: a driver leaves out what a constant condition excludes, and only it knows.
+This depends on the text only: code that a constant condition excludes is known only to the driver.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rendergraph.program.text import StageText, prefix
 from rendergraph.steps import Read, Step, Write
 
 _VIEWS = re.compile(r"\b([A-Za-z_]\w*)_views\b")
-_UNIFORMS = re.compile(r"uniform[^;]*;")  # found quickly; each begins with the character before it, for `\b`
+_UNIFORMS = re.compile(r"uniform[^;]*;")  # fast; each match starts one character early, for `\b`
 _BUFFER = re.compile(r"\bbuffer\s+([A-Za-z_]\w*)\s*\{")
 _UNIFORM = re.compile(
     r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?(?!\w*(?:sampler|image|only\b|coherent|volatile|restrict))\w+\s+([A-Za-z_][\w\s,]*)[;=\[]"
@@ -30,7 +30,7 @@ _CONSTANT_IF = re.compile(r"\bif\s*\([A-Z0-9_\s!=<>&|()+-]*[A-Z][A-Z0-9_\s!=<>&|
 
 
 def unbound_sampler(step: Step, name: str, sampled: Collection[str], cls: type[Node]) -> str:
-    """Return what is wrong with a sampler that the step binds no texture to."""
+    """Return the message for a sampler without a texture."""
     if name in cls.ports():
         return f"{_files(step)} samples {_left_out(step, name, cls)}"
     for function in step.functions:
@@ -39,34 +39,34 @@ def unbound_sampler(step: Step, name: str, sampled: Collection[str], cls: type[N
             text = f"{function.shader} of node '{function.node}' samples '{stem}'"
             return f"{text}, which is not among the `reads` of its Function; add it there"
     slot = name.endswith("_texture") and step.kind == "geometry"
-    guard = f"; not every material has it, so it stands inside #ifdef HAS_{name.upper()}" if slot else ""
+    guard = f"; not every material has it, so put it inside #ifdef HAS_{name.upper()}" if slot else ""
     text = f"{_files(step)} samples '{name}', but the step reads no texture of that name"
     return f"{text}; it reads {', '.join(sorted(sampled)) or 'none'}{guard}"
 
 
 def unbound_block(step: Step, name: str) -> str:
-    """Return what is wrong with a block that the step binds no buffer to."""
+    """Return the message for a block without a buffer."""
     uses: tuple[Read | Write, ...] = (*step.all_reads, *step.writes)
     own = ", ".join(sorted({use.name for use in uses if use.use == "buffer"})) or "none"
-    return f"{_files(step)} looks at block '{name}', but the step has no buffer of that name; it has {own}"
+    return f"{_files(step)} uses block '{name}', but the step has no buffer of that name; it has {own}"
 
 
 def unset_uniform(step: Step, name: str) -> str:
-    """Return what is wrong with a uniform that the step gives no value."""
+    """Return the message for a uniform without a value."""
     hint = suggestion(name, [known for known, _ in step.uniforms])
-    return f"{_files(step)} looks at uniform '{name}', which nothing sets{hint}"
+    return f"{_files(step)} uses uniform '{name}', which nothing sets{hint}"
 
 
 def unbound(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> Iterator[tuple[StageText, str, Problem]]:
-    """Yield stage, name and problem of what authors' shaders certainly use and the step does not provide as declared.
+    """Yield stage, name and problem of everything that authors' shaders use but the step does not provide as declared.
 
-    Warnings are about what a constant condition might exclude.
+    Code that a constant condition might exclude gives warnings.
     """
     for text in texts.values():
         blocks = [block for block in text.source.blocks if block.origin.file is not None and not block.origin.shared]
         own = "\n".join("\n".join(block.lines) for block in blocks)
         found = list(_suspects(step, own, text.text, cls))
-        if found:  # mostly in a branch that the step's macros exclude
+        if found:  # usually in a branch that the step's macros exclude
             macros = [line for block in text.source.blocks if block.origin.file is None for line in block.lines]
             quick = compiled_text("\n".join([*macros, own]), certain=True)
             found = [one for one in found if one[1] in quick and re.search(one[2], quick)]
@@ -83,7 +83,7 @@ def unbound(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> Iter
 
 
 def uniform_kinds(step: Step) -> tuple[tuple[str, int, bool], ...]:
-    """Return the uniforms of a step with the number of their values, and whether these are floats."""
+    """Return the uniforms of a step with their numbers of values, and whether the values are floats."""
     found = []
     for name, value in step.uniforms:
         numbers = value if isinstance(value, tuple | list) else (value,)
@@ -92,7 +92,7 @@ def uniform_kinds(step: Step) -> tuple[tuple[str, int, bool], ...]:
 
 
 def _suspects(step: Step, own: str, whole: str, cls: type[Node]) -> Iterator[tuple[str, str, str, Callable[[], str]]]:
-    """Yield code, name, a pattern of the line that counts if it is compiled, and what returns the problem's text."""
+    """Yield code, name, a pattern of the line that matters if compiled, and a function that returns the message."""
     uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
     given = {use.name for use in uses}
     given |= {prefix(each.node) + read.name for each in step.functions for read in each.reads}
@@ -121,7 +121,7 @@ def _suspects(step: Step, own: str, whole: str, cls: type[Node]) -> Iterator[tup
 
 
 def _unfit_uniform(step: Step, name: str, kind: str, count: int) -> str:
-    """Return what the declaration of a uniform and its value disagree about."""
+    """Return how the declaration of a uniform and its value disagree."""
     size = int(kind[-1]) if kind[-1].isdigit() else 1
     value = dict(step.uniforms)[name]
     floats = f"floats, {(value[0] if isinstance(value, tuple | list) else value)!r}"
@@ -131,16 +131,16 @@ def _unfit_uniform(step: Step, name: str, kind: str, count: int) -> str:
 
 def _without_views(step: Step, port: str, given: Collection[str], cls: type[Node]) -> str:
     if port in given:
-        text = f"{_files(step)} looks at the views of '{port}', but what is linked there was not drawn with a view"
+        text = f"{_files(step)} uses the views of '{port}', but the texture linked there was not drawn with a view"
         return f"{text}; use `camera`, or give the linked output `view=`"
-    return f"{_files(step)} looks at the views of {_left_out(step, port, cls)}"
+    return f"{_files(step)} uses the views of {_left_out(step, port, cls)}"
 
 
 def _left_out(step: Step, name: str, cls: type[Node]) -> str:
-    """Say why a step does not read a port of its node, and the way out."""
+    """Return why a step does not read a port of its node, and the fix."""
     optional = getattr(cls.ports()[name], "optional", False)
     guard = f"leave it out by #ifdef HAS_{name.upper()}"
-    if step.where.caller is None:  # it reads all that is connected
+    if step.where.caller is None:  # it reads all connected inputs
         return f"'{name}', which is not connected here; {guard}" if optional else f"'{name}', which it does not read"
     near = nearest(name, {use.name for use in step.reads} - cls.ports().keys())
     way = f"give it as {name}=…, not {near}=…" if near is not None else f"add {name}=self.{name} to the step"

@@ -1,4 +1,4 @@
-"""The macros that scene, lights and batches add to a step's program: one variant for each kind of batch."""
+"""The macros of scene, lights and batches in a step's program: one variant for each kind of batch."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ FIXED_BLOCKS = {
     "material_uv_block": 4,
     "environment_block": 5,
 }
-"""Binding points of the blocks the framework keeps; view tables follow."""
+"""Binding points of the framework's blocks; view tables follow."""
 LARGEST_BLOCK = 65536
-"""Bytes that a uniform block holds on drivers for desktops; OpenGL promises 16384."""
+"""Size of a uniform block in bytes on desktop drivers; OpenGL guarantees 16384."""
 
 
 def variants(
     step: Step, scene: Scene, packed: PackedScene, views: Mapping[str, ViewTable], largest_block: int = LARGEST_BLOCK
 ) -> list[dict[str, str]]:
-    """Return the `defines` of `stage_texts` for every program that a step is compiled to.
+    """Return the `defines` of `stage_texts` for every program of a step.
 
-    In the order in which the scene's objects first need them; none for a geometry step that draws nothing. Tables of
-    more than `largest_block` bytes are storage blocks.
+    They are in the order in which the scene's objects first need them; none for a geometry step that draws nothing.
+    Tables of more than `largest_block` bytes are storage blocks.
     """
     stored = storage_blocks(packed, largest_block)
     macros = light_macros(scene, stored)
@@ -103,7 +103,7 @@ def scene_macros(scene: Scene, packed: PackedScene, stored: Collection[str]) -> 
 
 
 def _evenly_scaled(rows: npt.NDArray[np.float32]) -> bool:
-    """Whether the matrix of every object, (n, 3, 4), only rotates, translates and scales uniformly."""
+    """Return whether the matrices of all objects, (n, 3, 4), only rotate, translate and scale uniformly."""
     linear = rows[:, :, :3].astype(np.float64)
     products = np.einsum("nij,nkj->nik", linear, linear)
     size = np.trace(products, axis1=1, axis2=2)[:, None, None] / 3
@@ -119,9 +119,9 @@ def select(scene: Scene, step: Step) -> list[int]:
 
 
 def features(scene: Scene, index: int, level: str) -> tuple[dict[str, str], dict[str, Texture]]:
-    """Return macros and textures of an object's material for a shader with this `level`, whether animated or not.
+    """Return the macros and textures of an object's material for a shader with this `level`, animated or not.
 
-    Only differences are named, so that otherwise equal objects share a batch.
+    Only differences matter, so that otherwise equal objects share a batch.
     """
     placed = scene.objects[index]
     material, mesh = scene.materials[placed.material], scene.meshes[placed.mesh]

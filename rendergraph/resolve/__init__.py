@@ -1,4 +1,4 @@
-"""Document to PipelineSpec: `extends`, patches, `--set`, parameters and sub-pipelines applied, every origin kept."""
+"""Resolve a document into a PipelineSpec: apply `extends`, patches, `--set`, parameters and sub-pipelines."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ def resolve(
 ) -> PipelineSpec:
     """Return a pipeline with patches, `--set`, sub-pipelines and parameters applied.
 
-    Mistakes that do not stop the resolving are in its `problems`, for `link` to raise with its own.
+    Mistakes that do not prevent resolving are in its `problems`, which `link` raises with its own.
 
     Args:
         source: a shipped name, a file, YAML text of several lines, or plain data.
         patches: merge patches, files or plain data, applied in order.
-        sets: `PATH=VALUE` texts or a mapping of paths to values; together one patch, types first.
-        asset_roots: further folders that files may be read from.
+        sets: `PATH=VALUE` texts or a mapping of paths to values; applied as one patch, types first.
+        asset_roots: further folders from which files may be read.
     """
     wanted = settings(sets)
     files = Files(catalog, asset_roots, limits)
     document = _entry(source, limits)
     is_shipped = document.path is not None and shipped_pipelines().get(document.path.stem) == document.path
-    home = Path() if is_shipped or document.path is None else document.path.parent  # where the resolved file will stand
+    home = Path() if is_shipped or document.path is None else document.path.parent  # folder of the resolved file
     roots = Roots.of_file(home / "x", files.asset_roots)
     files.plugins.start(home, roots)
     files.own(document, None if is_shipped else roots)
@@ -58,7 +58,7 @@ def resolve(
     for patch in patches:
         tree = files.patched(tree, _patch(patch, files, limits))
     if isinstance((value := tree.get("scene") or tree).data, dict) and value is not tree:
-        overrides.pop("scene", None)  # a patch changes the scene that was chosen
+        overrides.pop("scene", None)  # a patch changes the chosen scene
     if size is not None:
         overrides["size"] = from_plain(list(size), Source(Option("--size", f"{size[0]}x{size[1]}")))
     tree = tree.updated(overrides)
@@ -115,7 +115,7 @@ def _entry(source: str | Path | Document | Mapping[str, Any], limits: YamlLimits
         return read(shipped[source], None, limits, keep_going=True)
     path = Path(source)
     if path.suffix.lower() not in (".yaml", ".yml") and path.is_file():
-        import shlex  # what has another ending is rare
+        import shlex  # other extensions are rare
 
         from rendergraph.scene.mesh_files import MESHES  # likewise
 
@@ -124,7 +124,7 @@ def _entry(source: str | Path | Document | Mapping[str, Any], limits: YamlLimits
             text = f"this file is a scene, not a pipeline; render it with: {way}"
             raise InputError(Problem("RG013", text, Place(str(path))))
     try:
-        return read(path, None, limits, keep_going=True)  # it is looked for again, also where it is missing now
+        return read(path, None, limits, keep_going=True)  # records that the file was looked for, even if it is missing
     except InputError:
         if path.exists() or path.stem not in shipped_pipelines():
             raise
@@ -159,14 +159,14 @@ def _size(tree: Value, files: Files) -> tuple[int, int]:
     value = tree.get("size")
     if value is None or value.data is None:
         return DEFAULT_SIZE
-    validator = Validator(CODES)  # files have been read; this is for the command line
+    validator = Validator(CODES)  # only for the command line: files are validated when read
     good = validator.value(value, SIZE)
     files.problems += validator.problems
     return plain(good, SIZE.type) if good is not None else DEFAULT_SIZE
 
 
 def _scene(tree: Value, files: Files, typed: str | Path | None) -> tuple[Path | None, Value | None, Roots]:
-    """Return the scene's file, what the pipeline changes in it or has instead of it, and where that may read from."""
+    """Return the scene's file, the pipeline's changes to it or replacement for it, and the roots for its files."""
     value, changes = tree.get("scene"), None
     if value is not None and isinstance(value.data, dict):
         changes = value.with_data({key: entry for key, entry in value.items() if key != "extends"})
@@ -174,7 +174,7 @@ def _scene(tree: Value, files: Files, typed: str | Path | None) -> tuple[Path | 
     if value is None or value.data is None:
         return None, changes, files.roots_of(changes or tree)
     if typed is not None and not is_name(str(value.data)):
-        # Named by the user, so the file itself is beyond question; what it refers to is not.
+        # The user named the file, so it may be anywhere; files that it refers to may not.
         path = Path(typed)
         roots = Roots.of_file(path, files.asset_roots)
         found: tuple[Path, Roots] | None = (path, roots)
@@ -185,13 +185,13 @@ def _scene(tree: Value, files: Files, typed: str | Path | None) -> tuple[Path | 
     else:
         found = files.locate(value, shipped_scenes(), "scene")
     file, roots = found or (None, files.roots_of(value))
-    if changes is not None:  # what they name is beside the file that they stand in
+    if changes is not None:  # their paths are relative to the file that contains them
         roots = Roots(tuple(dict.fromkeys((*roots.folders, *files.roots_of(changes).folders))))
     return file, changes, roots
 
 
 def _with_scene(tree: Value, found: Path | None, document: Document) -> Value:
-    """Write the scene, and the files that its changes name, relative to the folder of the resolved file."""
+    """Make the paths of the scene, and of files that its changes name, relative to the folder of the resolved file."""
     value = tree.get("scene")
     if value is None:
         return tree

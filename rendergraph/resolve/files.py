@@ -1,4 +1,4 @@
-"""The files a pipeline is made of: what `extends` and `type` lead to, inside the roots."""
+"""The files of a pipeline: those that `extends` and `type` name, inside the roots."""
 
 from __future__ import annotations
 
@@ -43,18 +43,18 @@ class Files:
             raise InputError(self.problems)
 
     def roots_of(self, value: Value) -> Roots:
-        """Where the file that contains a value may read from."""
+        """Return the roots of the file that contains a value."""
         return self.roots.get(value.source) or Roots.of_file(Path("x"), self.asset_roots)
 
     def own(self, document: Document, roots: Roots | None = None) -> None:
-        """Register where a file may read from: its own surroundings if the user named it."""
+        """Register the roots of a file: its own surroundings if the user named it."""
         around = document.path or Path("x")
         self.roots[document.source] = roots or Roots.of_file(around, self.asset_roots)
         self.dropped |= document.dropped
         self.bring(document.root)
 
     def bring(self, tree: Value) -> None:
-        """Add the node types of a file's `plugins`, and note the nodes that it removes."""
+        """Add the node types of a file's `plugins`, and record the nodes that it removes."""
         nodes = tree.get("nodes")
         if nodes is not None and isinstance(nodes.data, dict):
             self.removed |= {name: node for name, node in nodes.data.items() if node.data is None}
@@ -63,19 +63,19 @@ class Files:
             self.plugins.add(value, self.beside(value), self.roots_of(value))
 
     def typed_roots(self, value: Value) -> Roots:
-        """Where a `type` may lead; a path typed on the command line may be anywhere."""
+        """Return the roots for a `type`; a path typed on the command line may be anywhere."""
         return self.roots.get(value.source) or Roots.of_file(self.beside(value), self.asset_roots)
 
     def beside(self, value: Value) -> Path:
         return value.source.beside(str(value.data))
 
     def locate(self, value: Value, shipped: dict[str, Path], what: str) -> tuple[Path, Roots] | None:
-        """Return the file a value names and where that may read from; report a problem and return None otherwise."""
+        """Return the file that a value names and its roots; report a problem and return None otherwise."""
         text = str(value.data)
         if is_name(text):
             if text in shipped:
                 return shipped[text], Roots((shipped[text].parent.resolve(),))
-            hint = suggestion(text, shipped, most=20)  # there are more scenes than words of most kinds
+            hint = suggestion(text, shipped, most=20)  # there are more scenes than a suggestion lists by default
             if what == "scene" and text in shipped_pipelines():
                 hint = "; it is a pipeline"
             elif next(self.beside(value).parent.glob(f"{text}.*"), None):
@@ -94,7 +94,7 @@ class Files:
         base = documents.pop().root
         tree = base.with_data({key: value for key, value in entries(base).items() if key != "extends"})
         for above in reversed(documents):
-            written = {key: value for key, value in above.root.items() if key != "extends"}  # a null removes
+            written = {key: value for key, value in above.root.items() if key != "extends"}  # nulls stay: they remove
             tree = self.patched(tree, above.root.with_data(written))
         return tree
 
@@ -147,7 +147,7 @@ class Files:
         path, roots = found
         key = path.resolve()
         if key not in self._trees:
-            self._trees[key] = None  # while it is being read, it does not know its own names
+            self._trees[key] = None  # its own names are unknown while it is being read
             try:
                 self._trees[key] = self.chain(self._read(path, roots, value))
             except InputError as error:
@@ -167,7 +167,7 @@ class Files:
         return (shipped_pipelines()[text] if is_name(text) else self.beside(value)).resolve()
 
     def names_of(self, value: Value) -> TypeNames | None:
-        """Return the ports and parameters of a type, None where it does not exist."""
+        """Return the ports and parameters of a type; None if it does not exist."""
         sub = self.sub_pipeline(value)
         if sub is not None:
             inputs = entries(sub, "inputs")
@@ -180,7 +180,7 @@ class Files:
         return self._names[text]
 
     def type_name(self, value: Value) -> str:
-        """Return the catalog's name of a `type`; of a missing file the text itself."""
+        """Return the catalog's name of a `type`; for a missing file, the text itself."""
         text = str(value.data)
         if not is_shader(text) or self.missing(value):
             return text
@@ -192,7 +192,7 @@ class Files:
         try:
             cls = self.catalog.get(text).cls
         except InputError:
-            return None  # `link` says what is wrong with it
+            return None  # `link` reports its mistakes
         groups = cls.groups()
         inputs = cls.inputs()
         optional = frozenset(name for name, port in inputs.items() if port.optional)
@@ -200,7 +200,7 @@ class Files:
         return TypeNames(frozenset(cls.parameters()), taken, groups, optional, frozenset(cls.outputs()))
 
     def missing(self, value: Value) -> Problem | None:
-        """Return what is wrong with a `type` that is a path, if anything."""
+        """Return the problem of a `type` that is a path, if any."""
         text = str(value.data)
         if is_name(text):
             return None

@@ -1,4 +1,4 @@
-"""Sub-pipelines unfolded and `$parameters` replaced: from a merged tree to plain nodes."""
+"""Flatten a merged tree to plain nodes: inline sub-pipelines and substitute `$parameters`."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Flattener(Struct, eq=False):
                 self.files.notes.append(problem.as_warning())
         top = dict(tree.mapping)
         if scope:
-            top.pop("plugins", None)  # the resolved file names those of all files at its top
+            top.pop("plugins", None)  # the top of the resolved file names those of all files
         if "nodes" in top:
             top["nodes"] = top["nodes"].with_data(nodes)
         return tree.with_data(top)
@@ -99,7 +99,7 @@ class Flattener(Struct, eq=False):
             self.files.report(problem)
         else:
             self.nodes[spec.id] = replace(spec, type=type_name)
-        # The resolved file needs it as a path relative to that file.
+        # The resolved file needs a path relative to itself.
         written = node.mapping and type_name and node_type.data != type_name
         return node.updated({"type": node_type.with_data(type_name)}) if written else node
 
@@ -128,7 +128,7 @@ class Flattener(Struct, eq=False):
                 self.files.report(node.problem("RG114", text, key=True))
         inside, outputs = f"{spec.id}/", entries(sub, "outputs")
         self.scopes[inside] = Scope(spec.scope, declared_inputs, spec.inputs, outputs, node, spec.disabled)
-        # What is written in place has no file that could contain itself.
+        # An inline sub-pipeline has no file; a unique path stands for it.
         self._open.append(path or Path(f"/{len(self._open) + 1}"))
         deeper = [replace(setting, scope=setting.scope[1:]) for setting in sets if len(setting.scope) > 1]
         whole = self.flatten(sub, inside, spec.params, deeper)
@@ -161,7 +161,7 @@ class Flattener(Struct, eq=False):
         return value
 
     def _replaced(self, value: Value, values: Mapping[str, Value | None], used: set[str]) -> Value | None:
-        """Replace `$name`; return None where the name is unknown or its parameter is wrong."""
+        """Replace `$name`; return None if the name is unknown or its parameter is wrong."""
         data = value.data
         if isinstance(data, str) and data.startswith("$"):
             match = re.match(_REFERENCE, data)

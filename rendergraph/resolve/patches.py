@@ -1,4 +1,4 @@
-"""Merge patches: of YAML values, of a pipeline whose nodes change their types, and of `--set` options."""
+"""Merge patches of YAML values, of pipelines whose nodes change types, and of `--set` options."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rendergraph.read import entries, word
 
 
 class TypeNames(Struct, frozen=True):
-    """The parameters and ports of a node type, as far as merging asks; `optional` inputs need no link."""
+    """The parameters and ports of a node type that merging needs; `optional` inputs need no link."""
 
     params: frozenset[str]
     inputs: frozenset[str]
@@ -24,7 +24,7 @@ class TypeNames(Struct, frozen=True):
 
 
 NamesOf = Callable[[Value], TypeNames | None]
-"""From the value of `type` to what it takes, None where there is no such type."""
+"""Returns the names of the type that a `type` value names; None if it does not exist."""
 
 
 def merge_scene(target: Value | None, patch: Value) -> Value:
@@ -35,7 +35,7 @@ def merge_scene(target: Value | None, patch: Value) -> Value:
 
 
 def diff(old: Any, new: Any) -> Any:
-    """Return the merge patch that turns `old` into `new`, both plain data without nulls; `{}` where they are equal."""
+    """Return the merge patch that turns `old` into `new`, both plain data without nulls; `{}` if they are equal."""
     if not isinstance(old, dict) or not isinstance(new, dict):
         return new
     patch: dict[str, Any] = {key: None for key in old if key not in new}
@@ -48,10 +48,10 @@ def diff(old: Any, new: Any) -> Any:
 
 
 def merge_pipeline(target: Value, patch: Value, names_of: NamesOf) -> tuple[Value, list[Problem]]:
-    """Apply a patch; return the result and notes of what was dropped.
+    """Apply a patch; return the result and notes about dropped values.
 
     A node that changes its type loses inherited parameters and inputs that the new type lacks, and optional inputs of
-    others lose inherited links to outputs that it lacks. What the patch itself writes or removes is not touched.
+    other nodes lose inherited links to outputs that it lacks. Values that the patch itself sets or removes stay.
     """
     notes: list[Problem] = []
     old_nodes, new_nodes = entries(target, "nodes"), entries(patch, "nodes")
@@ -84,7 +84,7 @@ def merge_pipeline(target: Value, patch: Value, names_of: NamesOf) -> tuple[Valu
     merged = merge_patch(target, patch)
     if (scene := patch.get("scene")) is not None and scene.data is not None:
         merged = merged.updated({"scene": merge_scene(target.get("scene"), scene)})
-    # Merging takes a null away, but beside a group it still has to say that this one member is not connected.
+    # Merging removes nulls, but beside a group a null must stay: it disconnects one member.
     for name, links in disconnected.items():
         present = merged.get("nodes", name, "inputs")
         if links and present is not None:
@@ -207,7 +207,7 @@ def _split(text: str) -> tuple[str, str | None]:
 
 def _value(text: str, source: Source) -> Value:
     if text.lstrip().startswith("#"):
-        return Value(text, source)  # a colour, most likely; YAML would see a comment
+        return Value(text, source)  # probably a colour; YAML would read a comment
     return _with_source(parse(text, source.origin).root, source)
 
 
@@ -255,7 +255,7 @@ def patch_of(tree: Value, wanted: Sequence[Setting], names_of: NamesOf) -> tuple
         new_type = root.get("nodes", setting.node, "type") or node.get("type")
         names = names_of(new_type) if new_type is not None else None
         if names is None:
-            continue  # a type that does not exist is said once, at the type
+            continue  # an unknown type is reported only once, at the type
         if setting.name not in names.params | names.inputs:
             choices = sorted(names.params | names.inputs)
             word = new_type.data if new_type is not None and isinstance(new_type.data, str) else "sub-pipeline"

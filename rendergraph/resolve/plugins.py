@@ -1,6 +1,6 @@
-"""Node types that pipeline files bring along: shader files by path, folders of them, and packages they need.
+"""Node types that pipeline files provide: shader files by path, folders of them, and required packages.
 
-A pipeline file is data, so nothing here imports anything: shader files alone come by it, and from inside the roots.
+A pipeline file is data, so nothing is imported here: it can provide only shader files, and only from inside the roots.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ _PACKAGE = r"[A-Za-z0-9](?:[A-Za-z0-9_-]{0,98}[A-Za-z0-9])?\Z"
 
 
 class Plugins:
-    """The catalog of a pipeline, which grows with the files that are read.
+    """The catalog of a pipeline, extended by the files that are read.
 
     Attributes:
-        missing: packages that are needed and not installed.
-        unrun: types whose Python is in a folder that only a pipeline file names, and the argument `--plugin` needs.
+        missing: packages that are required but not installed.
+        unrun: types whose Python code is in a folder that only a pipeline file names, and the argument for `--plugin`.
         written: the entries of `plugins` in the resolved file, by text.
     """
 
@@ -78,11 +78,11 @@ class Plugins:
             self._shaders(value, text, folder, roots)
 
     def _package(self, value: Value, name: str) -> None:
-        if not re.match(_PACKAGE, name):  # what is said is typed into a shell
+        if not re.match(_PACKAGE, name):  # users paste the message into a shell
             self._report(value.problem("RG131", f"'{shown(name)}' is neither a folder of plugins nor a package's name"))
             return
         self.written.setdefault(name, value)
-        # While it is being written, its folder is named and it is not installed.
+        # A plugin in development is named by its folder and not installed.
         if version(name) is None and name not in self.missing and not self.catalog.has_plugin(name):
             self.missing.append(name)
             text = f"the pipeline needs the plugin '{name}', which is not installed: pip install {name}"
@@ -101,7 +101,7 @@ class Plugins:
         self.catalog = self.catalog.with_shaders((name, one) for name, one in found if one.file not in outside)
         strange = [file for file in python if file not in self.catalog.files()]
         if strange:
-            import shlex  # for a warning alone
+            import shlex  # only for a warning
 
             names = ", ".join(sorted(file.name for file in strange)[:3]) + (", …" if len(strange) > 3 else "")
             words = f"'{shown(text)}' has Python ({names}), which is not run because a pipeline file names it; "

@@ -1,4 +1,4 @@
-"""What a pipeline is after resolving: plain nodes with every value's origin, and the same as YAML text."""
+"""A resolved pipeline: plain nodes with every value's origin, and the same as YAML text."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def flow(value: Value) -> str:
 
 
 def text_of(data: Any) -> str:
-    """Return a scalar as YAML, in quotes where it needs them."""
+    """Return a scalar as YAML, quoted if necessary."""
     if data is None:
         return "null"
     if isinstance(data, bool):
@@ -68,7 +68,7 @@ def text_of(data: Any) -> str:
 def _escaped(char: str) -> str:
     if char in '"\\':
         return f"\\{char}"
-    # YAML's own escapes, not JSON's, whose pairs of surrogates PyYAML does not join.
+    # YAML's own escapes, because PyYAML does not join the surrogate pairs of JSON's.
     if char.isprintable():
         return char
     return f"\\u{ord(char):04X}" if ord(char) < 0x10000 else f"\\U{ord(char):08X}"
@@ -87,14 +87,14 @@ def _short(source: Source) -> str:
 
 
 DEFAULT_SIZE = (1280, 720)
-"""Width and height where nothing says otherwise."""
+"""Default width and height."""
 
 
 class NodeSpec(Struct, frozen=True, eq=False):
-    """One node, sub-pipelines unfolded.
+    """One node, after sub-pipelines are inlined.
 
     Attributes:
-        scope: id of the enclosing sub-pipeline with a slash behind, or empty.
+        scope: id of the enclosing sub-pipeline with a trailing slash, or empty.
         inputs: links by input or group name; null disconnects.
         params: values by name, `$name` replaced, nulls left out.
         disabled: the `false` that removes it, its own or that of an enclosing sub-pipeline.
@@ -114,7 +114,7 @@ class NodeSpec(Struct, frozen=True, eq=False):
 
 
 class Scope(Struct, frozen=True, eq=False):
-    """A sub-pipeline in its place: its declared `inputs` and `outputs`, and the `links` that its node gives to them."""
+    """An inlined sub-pipeline: its declared `inputs` and `outputs`, and the `links` that its node gives to them."""
 
     parent: str
     inputs: Mapping[str, Value]
@@ -139,14 +139,14 @@ class PipelineSpec(Struct, frozen=True, eq=False):
     Attributes:
         scene: the scene's file, if there is one.
         scene_changes: the mapping of the pipeline that is merged into the scene, or is the scene.
-        roots: where the scene may read from; `roots.check(path, place)`.
-        source_roots: where files that parameters name may be, by the file in which they stand.
+        roots: folders from which the scene may read; `roots.check(path, place)`.
+        source_roots: folders for files that parameters name, by the file that contains the parameter.
         scopes: sub-pipelines by scope (`glow/`).
-        tree: the resolved file, sub-pipelines in place of their names.
+        tree: the resolved file, with sub-pipelines in place of their names.
         problems: mistakes found so far; `link` raises them with its own, so that a user sees all at once.
-        dropped: paths of what was left out because of them.
+        dropped: paths of values that were left out because of them.
         removed: the `null` of each node that a file removes from what it extends.
-        unrun: types whose Python is in a folder that only a pipeline file names, and the argument `--plugin` needs.
+        unrun: types whose Python code is in a folder that only a pipeline file names, and the argument for `--plugin`.
     """
 
     name: str
@@ -172,7 +172,7 @@ class PipelineSpec(Struct, frozen=True, eq=False):
 
     @property
     def scene_name(self) -> str:
-        """The stem of the scene's file, which changes may have; empty without a scene."""
+        """The stem of the scene's file or of the file with changes; empty without a scene."""
         if self.scene is None:
             return "" if self.scene_changes is None else "scene"
         return self.scene.stem

@@ -1,4 +1,4 @@
-"""A scene at a moment, and the camera of a scene without one."""
+"""Evaluate a scene at a moment, and add missing cameras and surroundings."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rendergraph.scene.rig import Pose
 
 _MOMENTS = 12
-"""Of a clip that a framing camera looks at."""
+"""Moments of a clip that a framing camera takes into account."""
 
 
 def complete(
@@ -39,10 +39,10 @@ def complete(
     Call it once, before `at`: the added light stays in place while the camera moves.
 
     Args:
-        camera_name: of a camera of the scene, or a camera as text, `eye=0,1,5 target=0,1,0 fov=40`.
+        camera_name: name of one of the scene's cameras, or a new camera as text, `eye=0,1,5 target=0,1,0 fov=40`.
         aspect: width over height of the picture for an added camera.
         bare: add no surroundings.
-        shutter: that of all cameras.
+        shutter: shutter of all cameras.
     """
     cameras = dict(scene.cameras)
     if not cameras:
@@ -52,7 +52,7 @@ def complete(
         changed = {key: {**values, "shutter": shutter} for key, values in scene.recipe.items() if key[0] == "cameras"}
         scene = replace(scene, recipe={**scene.recipe, **changed})
     if camera_name is not None and "=" in camera_name:
-        from rendergraph.scene.camera_words import described_camera  # few cameras are
+        from rendergraph.scene.camera_words import described_camera  # rarely needed
 
         cameras = {"--camera": described_camera(camera_name, next(iter(cameras.values()))), **cameras}
     elif camera_name is not None:
@@ -69,7 +69,7 @@ def moves(scene: Scene) -> bool:
 
 
 def length(scene: Scene) -> float:
-    """Return the seconds until clips and keyframes end, or an orbit closes; 0 where nothing moves."""
+    """Return the seconds until clips and keyframes end, or an orbit closes; 0 if nothing moves."""
     ends = [rig.length for rig in scene.rigs]
     ends += [float(curve.times[-1]) for curve in scene.keyframes.values()]
     orbit = abs(scene.orbit.degrees_per_second) if scene.orbit is not None else 0.0
@@ -77,9 +77,9 @@ def length(scene: Scene) -> float:
 
 
 def on_turntable(scene: Scene, fps: float, frames: range, aspect: float) -> Scene:
-    """Return the scene with its camera on one closed circle, in place of the scene's own orbit.
+    """Return the scene with its camera on one full circle around its target, instead of the scene's own orbit.
 
-    It goes around its target. A camera that `complete` has added stands where everything is in the picture all around.
+    A camera that `complete` has added moves to where everything stays in the picture on the whole circle.
     """
     camera = scene.camera
     if camera is not None and camera.name == "default" and ("cameras", "default") not in scene.recipe:
@@ -89,19 +89,19 @@ def on_turntable(scene: Scene, fps: float, frames: range, aspect: float) -> Scen
 
 
 def play(scene: Scene, clip: str | None = None, speed: float = 1.0, start: float = 0.0) -> Scene:
-    """Return the scene of an animated file with a clip playing, by default its first one, as it is at first."""
+    """Return the scene of an animated file at the start of a clip, by default its first one."""
     (rig,) = scene.rigs
     chosen = rig.clips[clip or next(iter(rig.clips))]
     return _posed(replace(scene, rigs=(replace(rig, clip=chosen, speed=speed, start=start),)), 0.0)
 
 
 def at_rest(scene: Scene) -> Scene:
-    """Return the scene of an animated file as its nodes stand, for good."""
+    """Return the scene of an animated file at rest, without animation."""
     return replace(baked(_posed(scene, 0.0)), rigs=(), placements={})
 
 
 def baked(scene: Scene) -> Scene:
-    """Return the scene at a moment with meshes that are as they are posed, and nothing that says so."""
+    """Return the scene at a moment with posed meshes in place of animated ones."""
     poses = {placed.mesh: placed.pose for placed in scene.objects if placed.pose is not None}
     meshes = list(scene.meshes)
     for number, pose in poses.items():
@@ -111,17 +111,17 @@ def baked(scene: Scene) -> Scene:
 
 
 def moving_plugin_keys(scene: Scene) -> set[str]:
-    """Return the sections of which keyframes change plugins' keys."""
+    """Return the sections in which keyframes change plugins' keys."""
     paths = [(path.partition(".")[0], path.rpartition(".")[2]) for path in scene.keyframes if scene.plugin_keys]
     return {section for section, key in paths if key in scene.plugin_keys.get(section, ())}
 
 
 def at(scene: Scene, time_s: float) -> Scene:
-    """The scene at a time in seconds: files' clips, then keyframes, then the orbit. Meshes are shared, never copied."""
+    """Return the scene at a time in seconds: clips, then keyframes, then the orbit. Meshes are shared, never copied."""
     if not moves(scene):
         return scene
     first, scene = scene, _posed(scene, time_s)
-    cameras: dict[str, dict[str, Any]] = {}  # those that follow an object, which has to move first
+    cameras: dict[str, dict[str, Any]] = {}  # cameras that follow an object, which must move first
     for section, name, curves in first.tracks:
         values = {key: curve.at(time_s) for key, curve in curves}
         if section == "cameras" and name in first.follows:
@@ -129,7 +129,7 @@ def at(scene: Scene, time_s: float) -> Scene:
             continue
         recipe = scene.recipe.get((section, name), {})
         added = {key: values.pop(key) for key in scene.plugin_keys.get(section, frozenset()) & values.keys()}
-        if added and section == "objects":  # a part of a file may have other values than the whole
+        if added and section == "objects":  # parts of a file may have different values
             scene = _with_extra(scene, name, added)
         elif added:
             values["extra"] = Extra({**recipe.get("extra", NO_EXTRA), **added})
@@ -137,13 +137,13 @@ def at(scene: Scene, time_s: float) -> Scene:
             scene = _changed(scene, section, name, {**recipe, **values})
     if first.follows:
         scene = following(scene, cameras)
-    # Clips move what is around a target, and not the target.
+    # Clips do not move the target.
     placed = scene if any(section == "objects" for section, *_ in first.tracks) else first
     return scene if scene.orbit is None else _orbited(scene, time_s, placed)
 
 
 def _posed(scene: Scene, time_s: float) -> Scene:
-    """The scene with what its files' clips move, and where that is in each placement of a file."""
+    """Return the scene with its files' clips applied in each placement of a file."""
     for rig in scene.rigs:
         worlds, parts = rig.at(time_s)
         local: Any = [part[0] for part in parts], worlds[list(rig.lights)], worlds[list(rig.cameras)]
@@ -167,7 +167,7 @@ def _posed(scene: Scene, time_s: float) -> Scene:
 
 
 def _over_clips(scene: Scene) -> Scene:
-    """The scene with its animated objects at several moments of their clips, for a camera that frames them all."""
+    """Return the scene with animated objects at several moments of their clips, for a camera that frames all."""
     longest = max((rig.length for rig in scene.rigs), default=0.0)
     moments = [_posed(scene, longest * number / _MOMENTS).objects for number in range(1, _MOMENTS if longest else 0)]
     changed = [placed for moment in moments for placed in compress(moment, map(is_not, moment, scene.objects))]
@@ -175,7 +175,7 @@ def _over_clips(scene: Scene) -> Scene:
 
 
 def following(scene: Scene, changed: Mapping[str, Mapping[str, Any]]) -> Scene:
-    """Return the scene with its cameras that follow an object turned to it; `changed` are their other new values."""
+    """Return the scene with cameras turned to the objects that they follow; `changed` are their other new values."""
     for name, parts in scene.follows.items():
         recipe = scene.recipe["cameras", name]
         scene = _changed(scene, "cameras", name, {**recipe, **changed.get(name, {})}, _middle(scene, parts))
@@ -183,7 +183,7 @@ def following(scene: Scene, changed: Mapping[str, Mapping[str, Any]]) -> Scene:
 
 
 def _middle(scene: Scene, parts: Iterable[int]) -> Vec3:
-    """The middle of the boxes of some objects at rest; a skin moves it by the mean of its joints, which is steady."""
+    """Return the centre of the boxes of objects at rest; a skin moves it by the mean of its joints, which is steady."""
     corners = []
     for placed in (scene.objects[index] for index in parts):
         low, high = np.array(scene.meshes[placed.mesh].box, np.float64)
@@ -199,8 +199,8 @@ def _middle(scene: Scene, parts: Iterable[int]) -> Vec3:
 
 
 def _orbited(scene: Scene, time_s: float, placed: Scene) -> Scene:
-    """The scene with its camera turned; `placed` has the same objects, and perhaps their bounds already."""
-    assert scene.orbit is not None  # the caller asked
+    """Return the scene with its camera on the orbit; `placed` has the same objects, possibly with cached bounds."""
+    assert scene.orbit is not None  # checked by the caller
     name = scene.orbit.camera or next(iter(scene.cameras), "")
     if name not in scene.cameras:
         return scene
@@ -214,7 +214,7 @@ def _orbited(scene: Scene, time_s: float, placed: Scene) -> Scene:
 
 
 def _changed(scene: Scene, section: str, name: str, values: Mapping[str, Any], followed: Vec3 | None = None) -> Scene:
-    """The scene with other values of one entry of a section."""
+    """Return the scene with changed values of one entry of a section."""
     if section == "objects":
         world, copies = scene_values.placed(values), scene.copies.get(("objects", name))
         return _placed_again(scene, [(name, world)] if copies is None else copies.placed(name, world), scene.placements)
@@ -223,7 +223,7 @@ def _changed(scene: Scene, section: str, name: str, values: Mapping[str, Any], f
         if scene.environment is None:
             return scene
         environment = replace(scene.environment, intensity=intensity, rotate=turn)
-        sun = environment.sunlight  # the only directional light, where there is one
+        sun = environment.sunlight  # the only directional light, if any
         lights = tuple(sun if sun is not None and light.type == "directional" else light for light in scene.lights)
         return replace(scene, environment=environment, lights=lights)
     try:
@@ -234,7 +234,7 @@ def _changed(scene: Scene, section: str, name: str, values: Mapping[str, Any], f
             copies = scene.copies.get((section, name))
             made = {entry.name: entry for entry in ([light] if copies is None else copies.lights(light))}
             return replace(scene, lights=tuple(made.get(entry.name, entry) for entry in scene.lights))
-    except ValueError as problem:  # two moving values can meet in between: eye and target, near and far
+    except ValueError as problem:  # two moving values, such as eye and target or near and far, can meet
         text = f"keyframes bring {section}.{name} to an impossible state: {problem}"
         raise InputError(Problem("RG323", text, Place(str(scene.source)) if scene.source else None)) from None
     materials = list(scene.materials)
@@ -245,7 +245,7 @@ def _changed(scene: Scene, section: str, name: str, values: Mapping[str, Any], f
 
 
 def _with_extra(scene: Scene, name: str, added: Mapping[str, Any]) -> Scene:
-    """The scene with other values of plugins' keys in every part of an object."""
+    """Return the scene with changed values of plugins' keys in every part of an object."""
     copies, objects = scene.copies.get(("objects", name)), list(scene.objects)
     names = [name] if copies is None else [f"{name}.{number}" for number in range(len(copies.offsets))]
     for index, _ in chain.from_iterable(scene.placements.get(name, Placement()).objects for name in names):
@@ -254,7 +254,7 @@ def _with_extra(scene: Scene, name: str, added: Mapping[str, Any]) -> Scene:
 
 
 def _placed_again(scene: Scene, copies: Iterable[tuple[str, Matrix]], placements: Mapping[str, Placement]) -> Scene:
-    """The scene with copies of files and shapes at other places, each with its transform."""
+    """Return the scene with copies of files and shapes moved, each to its transform."""
     objects, lights, cameras = list(scene.objects), list(scene.lights), dict(scene.cameras)
     for copy, matrix in copies:
         placement = placements.get(copy, Placement())

@@ -1,8 +1,8 @@
 """Bounding volume hierarchies for ray tracing: one tree over the triangles of each mesh, one over the placed objects.
 
-Trees are binary and built from the top by the binned surface-area heuristic (I. Wald, "On fast Construction of
+Trees are binary and built top-down by the binned surface-area heuristic (I. Wald, "On fast Construction of
 SAH-based Bounding Volume Hierarchies", 2007), on all three axes. All nodes of a level are split at once with NumPy,
-over all meshes together, in batches that fit the processor's cache. `trace.glsl` traverses them.
+for all meshes together, in batches that fit the processor's cache. `trace.glsl` traverses them.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ References: TypeAlias = npt.NDArray[np.int32]
 Bools: TypeAlias = npt.NDArray[np.bool_]
 
 LEAF = 4
-"""Most primitives of a leaf: a reference has two bits for their number."""
-_SLACK = 8  # levels that a tree may have more than a balanced one
+"""Maximum number of primitives in a leaf: a reference has two bits for it."""
+_SLACK = 8  # levels that a tree may have beyond a balanced one
 _BATCH = 1 << 14  # primitives that are split together: their boxes and bins fit a core's own cache
 _BINS, _FEW_BINS = 16, 8
-_FEW = 6  # primitives a node
+_FEW = 6  # primitives per node
 _SAMPLING, _ENOUGH = 8, 512  # every eighth primitive of nodes that have more than 8 times 512
-_STEP_COST = 0.5  # of visiting a node, in tests of a primitive
+_STEP_COST = 0.5  # cost of visiting a node, relative to a primitive test
 
 
 class Tree(Struct, frozen=True, eq=False):
@@ -40,7 +40,7 @@ class Tree(Struct, frozen=True, eq=False):
         children: int32 (n, 2). An inner node is its number; a leaf is `leaf(first, count)`, which is below 0.
         order: int32 (p,), the primitives in the order in which leaves count them.
         root: the reference of the topmost node; meaningless if there is no primitive.
-        depth: the largest number of inner nodes on a way from the root to a leaf.
+        depth: the largest number of inner nodes on a path from the root to a leaf.
     """
 
     boxes: Floats
@@ -51,17 +51,17 @@ class Tree(Struct, frozen=True, eq=False):
 
 
 def leaf(first: npt.NDArray[np.int64] | int, count: npt.NDArray[np.int64] | int) -> npt.NDArray[np.int64] | int:
-    """The reference to a leaf of `count` primitives from position `first` of the order: below 0."""
+    """Return the reference to a leaf of `count` primitives from position `first` of the order: below 0."""
     return -1 - (first * LEAF + count - 1)
 
 
 def depth_limit(primitives: int) -> int:
-    """The largest depth of a tree over so many primitives, whatever their boxes: what a stack must hold."""
+    """Return the largest depth of a tree over this many primitives, whatever their boxes; it bounds the stack."""
     return max(primitives - 1, 0).bit_length() + _SLACK
 
 
 def triangle_boxes(positions: Floats, triangles: npt.NDArray[np.uint32]) -> Floats:
-    """Boxes for `build` of triangles (t, 3) over positions (v, 3)."""
+    """Return boxes for `build` of triangles (t, 3) over positions (v, 3)."""
     boxes = np.empty((6, len(triangles)), np.float32)
     corners = np.ascontiguousarray(triangles.T)
     for axis in range(3):
@@ -72,17 +72,17 @@ def triangle_boxes(positions: Floats, triangles: npt.NDArray[np.uint32]) -> Floa
 
 
 class _Batch(Struct, eq=False):
-    """Nodes that are split together. k nodes, m primitives, node by node.
+    """Nodes that are split together: k nodes, and m primitives grouped by node.
 
     Attributes:
         first, count: int64 (k,), the node's part of the order.
-        slot: int64 (k,), where the parent keeps the node's reference.
-        area: float32 (k,), half the surface of the node's box.
-        level: int64 (k,), inner nodes above.
-        limit: int64 (k,), the most levels of the node's tree.
-        leaf: the most primitives of a leaf.
+        slot: int64 (k,), where the parent stores the node's reference.
+        area: float32 (k,), half the surface area of the node's box.
+        level: int64 (k,), the number of inner nodes above.
+        limit: int64 (k,), the maximum number of levels of the node's tree.
+        leaf: the maximum number of primitives in a leaf.
         numbers: int64 (m,), the primitives.
-        boxes: float32 (6, m), their least xyz and negated greatest xyz: the box of several is their minimum.
+        boxes: float32 (6, m), their minimum xyz and negated maximum xyz, so that the union of boxes is a minimum.
     """
 
     first: Ints
@@ -96,7 +96,7 @@ class _Batch(Struct, eq=False):
     leaf: int
 
     def parts(self) -> Iterator[_Batch]:
-        """The same nodes in batches of bounded size; a larger node is alone."""
+        """Yield the same nodes in batches of bounded size; a larger node is alone in its batch."""
         ends = np.cumsum(self.count)
         group = (ends - self.count) // _BATCH
         edges = [0, *(np.flatnonzero(np.diff(group)) + 1).tolist(), len(group)]
@@ -115,7 +115,7 @@ def build(boxes: Floats, sizes: Sequence[int], most: int = LEAF) -> list[Tree]:
     Args:
         boxes: float32 (6, p), least xyz and negated greatest xyz of each primitive, finite, group after group.
         sizes: the number of primitives of each group.
-        most: the most primitives of a leaf, up to `LEAF`.
+        most: the maximum number of primitives in a leaf, up to `LEAF`.
     """
     counts = np.array(sizes, np.int64)
     total, trees = int(counts.sum()), len(counts)
@@ -183,7 +183,7 @@ def build(boxes: Floats, sizes: Sequence[int], most: int = LEAF) -> list[Tree]:
 
 
 def refit(tree: Tree, boxes: Floats) -> Tree:
-    """Return a tree over the same primitives, which have moved: the same nodes with the boxes that hold them now."""
+    """Return the tree refitted to primitives that have moved: the same nodes with updated boxes."""
     levels, nodes = [], np.full(min(1, len(tree.children)), tree.root)
     while len(nodes):
         levels.append(nodes)
@@ -201,16 +201,16 @@ def refit(tree: Tree, boxes: Floats) -> Tree:
 
 
 def _depth_first(children: Ints, area: Floats, roots: Ints) -> Ints:
-    """Number the nodes of each tree (n,), a node's larger child right behind it.
+    """Number the nodes of each tree (n,) depth-first, with a node's larger child right after it.
 
-    A ray most often goes on to the larger child, which then mostly shares its cache line: 8 % faster.
+    A ray usually continues with the larger child, which then often shares its cache line: 8 % faster.
     """
     levels, nodes = [], roots[roots >= 0]
     while len(nodes):
         levels.append(nodes)
         below = children[nodes].reshape(-1)
         nodes = below[below >= 0]
-    sizes = np.zeros(len(children) + 1, np.int64)  # of the trees below nodes; the last entry is that of leaves
+    sizes = np.zeros(len(children) + 1, np.int64)  # sizes of subtrees; the last entry stands for leaves
     for nodes in reversed(levels):
         sizes[nodes] = 1 + sizes[np.maximum(children[nodes], -1)].sum(axis=1)
     first = np.argmax(np.where(children < 0, -1, area), axis=1)[:, None]
@@ -226,7 +226,7 @@ def _depth_first(children: Ints, area: Floats, roots: Ints) -> Ints:
 def _separate(
     references: Ints, boxes: Floats, owner: Ints, name: Ints, order: Ints, depths: Ints, counts: Ints
 ) -> list[Tree]:
-    """The trees one by one, with nodes numbered within their own tree by `name`."""
+    """Return the trees one by one, with nodes numbered within their own tree by `name`."""
     trees, total = len(counts), int(counts.sum())
     nodes = np.bincount(owner, minlength=trees)
     node_start, first = np.cumsum(nodes) - nodes, np.cumsum(counts) - counts
@@ -256,13 +256,13 @@ def _separate(
 
 
 def _ranges(first: Ints, count: Ints) -> Ints:
-    """The numbers from each `first`, `count` of them, one after the other."""
+    """Return the concatenated ranges of `count` numbers from each `first`."""
     starts = np.cumsum(count) - count
     return np.repeat(first - starts, count) + np.arange(int(count.sum()))
 
 
 def _stable_order(keys: Ints, count: int) -> Ints:
-    """The stable sorting order of keys below `count`; NumPy sorts 16 bits by counting."""
+    """Return the stable sorting order of keys below `count`; NumPy uses a radix sort for 16 bits."""
     return np.argsort(keys.astype(np.uint16) if count <= 1 << 16 else keys, kind="stable")
 
 
@@ -281,7 +281,7 @@ def _split(batch: _Batch) -> tuple[Ints, Bools, Bools]:
     low = np.minimum.reduceat(centers, starts, axis=1)
     extent = np.maximum.reduceat(centers, starts, axis=1) - low
     scale = np.where(extent > 0, np.float32(bins * (1 - 1e-6)) / np.maximum(extent, np.float32(1e-37)), np.float32(0))
-    # Of few primitives only the longest axis is tried, and of many some show the best split as well as all.
+    # With few primitives only the longest axis is tried; with many, a sample finds the best split as well.
     longest = np.argmax(extent, axis=0)
     axes: list[int | Ints] = [0, 1, 2] if total > _FEW * nodes else [longest]
     step = _SAMPLING if batch.count.min() >= _SAMPLING * _ENOUGH else 1
@@ -315,7 +315,7 @@ def _split(batch: _Batch) -> tuple[Ints, Bools, Bools]:
 
 
 def _bins_along(axis: Ints | int, node_of: Ints, centers: Floats, low: Floats, scale: Floats) -> Floats:
-    """Bin of each primitive along an axis, or along an axis for each node, with the part of it that it is inside."""
+    """Return the fractional bin of each primitive along an axis, or along an axis per node."""
     if isinstance(axis, int):
         value, first, step = centers[axis], low[axis], scale[axis]
     else:
@@ -326,7 +326,7 @@ def _bins_along(axis: Ints | int, node_of: Ints, centers: Floats, low: Floats, s
 
 
 def _costs(bounds: Floats, counts: Floats) -> Floats:
-    """Cost of each split, (a axes, bins - 1, k): area times primitives, of both sides; infinite if one is empty.
+    """Return the cost of each split, (a axes, bins - 1, k): summed area times primitives; infinite if a side is empty.
 
     Args:
         bounds: float32 (a, 6, bins, k), the boxes of the primitives in each bin.
@@ -352,14 +352,14 @@ def _costs(bounds: Floats, counts: Floats) -> Floats:
 
 
 def _half_area(boxes: Floats) -> Floats:
-    """Half the surface of boxes (6, …)."""
+    """Return half the surface area of boxes (6, …)."""
     x, y, z = (-(boxes[axis] + boxes[3 + axis]) for axis in range(3))
     area: Floats = x * y + y * z + z * x
     return area
 
 
 def _upper_half(batch: _Batch, starts: Ints, node_of: Ints, centers: Floats, extent: Floats) -> Bools:
-    """Whether a primitive lies in the upper half of its node, by rank along the node's longest axis."""
+    """Return whether a primitive lies in the upper half of its node, by rank along the node's longest axis."""
     along = centers[np.argmax(extent, axis=0)[node_of], np.arange(len(node_of))]
     ranked = np.lexsort((along, node_of))
     rank = np.empty(len(node_of), np.int64)

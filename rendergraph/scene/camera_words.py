@@ -1,4 +1,4 @@
-"""Cameras in words, as the command line and the metadata of pictures have them."""
+"""Cameras as text, for the command line and the metadata of pictures."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from rendergraph.scene.geometry import vec3
 from rendergraph.scene.model import Camera
 
 _WORDS = replace(scene_keys.CAMERA, keys=tuple(key for key in scene_keys.CAMERA.keys if key.name != "follow"))
-"""A camera in words always has a target."""
+"""A camera as text always has a target."""
 
 
 def keys_of(text: str) -> dict[str, Any]:
-    """Return the keys of a scene file's cameras that a text has, such as `eye=0,1,5 target=0,1,0 fov=40`.
+    """Return the camera keys of a scene file in a text such as `eye=0,1,5 target=0,1,0 fov=40`.
 
     `fov` stands for `fov_y_degrees`.
     """
@@ -42,7 +42,7 @@ def keys_of(text: str) -> dict[str, Any]:
 
 
 def described_camera(text: str, other: Camera) -> Camera:
-    """Return the camera of a text; what it does not say is that of another."""
+    """Return the camera of a text; values that it does not give come from another camera."""
     values = keys_of(text)
     x, y, z = other.transform[:3, 3]
     given = {
@@ -66,11 +66,11 @@ def described_camera(text: str, other: Camera) -> Camera:
 
 
 def camera_words(camera: Camera) -> str:
-    """Return the text of which `described_camera` makes this camera, whatever the other one is."""
+    """Return the text from which `described_camera` makes this camera, whatever the other camera is."""
     _, up, back, eye = (vec3(camera.transform[:3, column]) for column in range(4))
     lens = {"perspective": math.degrees(camera.fov_y), "orthographic": camera.height}.get(camera.type, camera.frustum)
     name = {"perspective": "fov", "orthographic": "height"}.get(camera.type, "frustum")
-    # As far ahead as its own target, which a camera that is moved by hand turns around.
+    # At the distance of its own target, around which a camera moved by hand turns.
     distance = 0.0 if camera.target is None else float(np.subtract(eye, camera.target) @ np.array(back))
     target = vec3(np.array(eye) - (distance if distance > 0 else 1.0) * np.array(back))
     values = {"eye": eye, "target": target, "up": up, name: lens, "near": camera.near, "far": camera.far}

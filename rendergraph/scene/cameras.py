@@ -1,4 +1,4 @@
-"""Cameras as matrices in float64, and the camera of a scene without one: as near as everything drawn allows."""
+"""Cameras as matrices in float64, and a camera that frames a scene without one as closely as possible."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ WIDE = 16 / 9
 MOST_POINTS = 1 << 24
 """Number of placed vertices above which the boxes of their meshes are measured instead."""
 _MARGIN = 0.94
-"""How much of the picture is filled where something touches it."""
+"""The fraction of the picture that the framed scene fills in its larger direction."""
 _BLOCK = 1 << 16
 
 
@@ -53,21 +53,21 @@ def bounding_sphere(scene: Scene) -> tuple[Vec3, float]:
 def framing_camera(
     scene: Scene, aspect: float = WIDE, most_points: int = MOST_POINTS, *, around: bool = False
 ) -> Camera:
-    """Frame everything drawn from (1, 0.6, 1.5), 45° high, from as near as its own points allow.
+    """Return a camera that frames everything drawn, as closely as possible, from direction (1, 0.6, 1.5) with 45° fov.
 
-    The camera looks along that direction, off-centre if that brings it nearer. Each side of the view is determined by
-    one number, the farthest extent of any point towards the side's plane.
+    It need not look at the centre of the scene if another position is closer. One number determines each side of the
+    view: the largest extent of any point towards the side's plane.
 
     Args:
         aspect: width over height of the picture.
         most_points: number of placed vertices above which the boxes of their meshes are framed.
-        around: look at the middle, from as far as to have everything in the picture from all directions around.
+        around: look at the centre, from a distance at which everything stays in the picture during a full turn.
     """
     center, radius = bounding_sphere(scene)
     axes = _axes()
     tall = math.tan(FRAMING_FOV / 2) * _MARGIN
     wide = tall * aspect
-    # Outward normals of the view's four sides, then the way to the viewer: in the camera's axes, then the world's.
+    # Outward normals of the view's four sides, then the direction to the viewer, from camera axes to world axes.
     sides = np.array([[1, 0, wide], [-1, 0, wide], [0, 1, tall], [0, -1, tall], [0, 0, 1]]) @ axes
     turns = np.eye(3)[None]
     if around:
@@ -77,7 +77,7 @@ def framing_camera(
     if around:
         right, top = left, bottom = max(right, left), max(top, bottom)
     away = max((right + left) / (2 * wide), (top + bottom) / (2 * tall))
-    nearest = max(away - front, 1e-3 * radius)  # depth of the foremost point
+    nearest = max(away - front, 1e-3 * radius)  # depth of the nearest point
     away = front + nearest
     transform = np.eye(4)
     transform[:3, :3] = axes.T
@@ -88,20 +88,20 @@ def framing_camera(
 
 
 def lowest_point(scene: Scene) -> float:
-    """Return the least y of everything drawn, in metres."""
+    """Return the minimum y of everything drawn, in metres."""
     return -float(_reaches(scene, np.array([(0.0, -1.0, 0.0)]), np.zeros(3), MOST_POINTS)[0])
 
 
 @cache
 def _axes() -> npt.NDArray[np.float64]:
-    """Of the framing camera, as rows: right, up, towards the viewer."""
+    """Return the framing camera's axes as rows: right, up, towards the viewer."""
     return projection.look_at(FRAMING_DIRECTION, (0.0, 0.0, 0.0))[:3, :3].T
 
 
 def _reaches(
     scene: Scene, directions: npt.NDArray[np.float64], center: npt.NDArray[np.float64], most_points: int
 ) -> npt.NDArray[np.float64]:
-    """The farthest extent of everything drawn along each of some directions, (n, 3), from a centre."""
+    """Return the largest extent of everything drawn along directions (n, 3), from a centre."""
     shown = [entry for entry in scene.objects if not entry.hidden]
     most = np.full(len(directions), -np.inf if shown else 0.5)
     by_mesh: dict[tuple[int, Pose | None], list[npt.NDArray[np.float64]]] = {}

@@ -19,10 +19,10 @@ class Curve(Struct, frozen=True, eq=False):
 
     Attributes:
         times: float64 (k,), seconds, increasing.
-        values: float64, numbers (k,), vectors (k, n), or unit quaternions x, y, z, w where `turns`.
+        values: float64, numbers (k,), vectors (k, n), or unit quaternions x, y, z, w if `turns`.
         ease: between two keys, `linear`; `smooth` starts and ends at rest (3t² - 2t³); `step` holds the first.
         turns: rotations, interpolated along the shorter arc (Shoemake 1985).
-        place: where they stand.
+        place: their place in the file.
     """
 
     times: Doubles
@@ -53,7 +53,7 @@ class Curve(Struct, frozen=True, eq=False):
 
 
 def quaternion(degrees: Doubles) -> Doubles:
-    """Return the unit quaternion x, y, z, w of turns about X, then Y, then Z, as `euler_matrix` has them."""
+    """Return the unit quaternion x, y, z, w of rotations about X, then Y, then Z, as in `euler_matrix`."""
     (x, y, z), (u, v, w) = np.sin(np.radians(degrees) / 2), np.cos(np.radians(degrees) / 2)
     return np.array(
         [

@@ -1,4 +1,4 @@
-"""How the triangles of a mesh meet at its edges, found once a mesh: for silhouettes and shadow volumes."""
+"""Edge adjacency of a mesh, computed once per mesh, for silhouettes and shadow volumes."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ Indices: TypeAlias = npt.NDArray[np.int64]
 
 
 class Edges(Struct, frozen=True, eq=False):
-    """The edges of a closed mesh, whose vertices count as one where their positions are equal. t triangles, e edges.
+    """The edges of a closed mesh: t triangles, e edges. Vertices with equal positions count as one.
 
     Attributes:
-        triangles: int64 (t, 3), vertices of the triangles; those with two corners in one place are left out.
-        beyond: int64 (t, 3), at each corner the vertex across the edge from there to the next corner.
-        ends: int64 (e, 2), vertices of each edge, in the order in which its first triangle runs it.
-        sides: int64 (e, 2), the two triangles that meet there.
-        gap: where the mesh is not closed, in words; empty for a closed one. The arrays are empty where it is not.
+        triangles: int64 (t, 3), vertices of the triangles, without those that have two equal corners.
+        beyond: int64 (t, 3), for each corner the vertex across the edge to the next corner.
+        ends: int64 (e, 2), vertices of each edge, in the direction of its first triangle.
+        sides: int64 (e, 2), the two triangles of each edge.
+        gap: a description of where the mesh is not closed, with empty arrays; empty if it is closed.
     """
 
     triangles: Indices
@@ -31,11 +31,11 @@ class Edges(Struct, frozen=True, eq=False):
 
 
 def is_solid(positions: Floats, triangles: npt.NDArray[np.integer]) -> bool:
-    """Whether a mesh is closed and encloses a volume, so that from outside its front faces hide its back faces.
+    """Return whether a mesh is closed and encloses a volume, so that its front faces hide its back faces from outside.
 
-    It is closed where each edge is run as often one way as the other. With a number for each place, the sum of
-    u v (u - v) over the edges from u to v is 0 then, and as good as never else: of random numbers of 64 bits, a single
-    missing triangle gives 0 once in 2⁴¹. Over the edges of one triangle it is (a - b) (b - c) (a - c).
+    It is closed if triangles use each edge equally often in both directions. With a random number for each position,
+    the sum of u v (u - v) over all edges from u to v is then 0, and otherwise almost never: with 64 random bits, a
+    single missing triangle gives 0 once in 2⁴¹. Over the edges of one triangle it is (a - b) (b - c) (a - c).
     """
     first, second, third = triangles.T
     x, y, z = (positions + np.float32(0)).view(np.uint32).astype(np.uint64).T  # -0 is 0
@@ -44,21 +44,21 @@ def is_solid(positions: Floats, triangles: npt.NDArray[np.integer]) -> bool:
     if ((a - b) * (b - c) * (a - c)).sum(dtype=np.uint64) != 0:
         return False
     x, y, z = positions.astype(np.float64).T
-    around_x = y[second] * z[third] - z[second] * y[third]  # of the cross product of two corners
+    around_x = y[second] * z[third] - z[second] * y[third]  # the cross product of two corners
     around_y = z[second] * x[third] - x[second] * z[third]
     around_z = x[second] * y[third] - y[second] * x[third]
     return float((x[first] * around_x + y[first] * around_y + z[first] * around_z).sum()) > 0  # six times the volume
 
 
 def _mixed(values: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
-    """Numbers whose bits all hang on all bits of others (Stafford, variant 13 of MurmurHash3's finaliser, 2011)."""
+    """Return hashes with bits that depend on all input bits (Stafford, variant 13 of MurmurHash3's finaliser, 2011)."""
     values = (values ^ (values >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     values = (values ^ (values >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return values ^ (values >> np.uint64(31))
 
 
 def find_edges(positions: Floats, triangles: npt.NDArray[np.integer]) -> Edges:
-    """The edges of a mesh: each is run by one triangle one way, and by one the other way, or the mesh is not closed."""
+    """Return the edges of a mesh; in a closed mesh, two triangles use each edge, in opposite directions."""
     place, count = _places(positions)
     corners = triangles.astype(np.int64)
     at = place[corners]
@@ -82,7 +82,7 @@ def find_edges(positions: Floats, triangles: npt.NDArray[np.integer]) -> Edges:
         )
         return _open(f"{meet} the edge from {a} to {b}")
     twin = order[found]
-    opposite = twin // 3 * 3 + (twin % 3 + 2) % 3  # the corner that is not on the edge
+    opposite = twin // 3 * 3 + (twin % 3 + 2) % 3  # the corner opposite the edge
     once = np.flatnonzero(np.arange(len(twin)) < twin)
     return Edges(
         corners,
@@ -98,8 +98,8 @@ def _open(gap: str) -> Edges:
 
 
 def _places(positions: Floats) -> tuple[Indices, int]:
-    """A number for each vertex, the same where positions are; and how many there are."""
-    x, y, z = np.ascontiguousarray(positions + np.float32(0.0)).view(np.uint32).T  # + 0: minus zero is zero
+    """Return a number for each vertex, equal for equal positions, and the count of distinct numbers."""
+    x, y, z = np.ascontiguousarray(positions + np.float32(0.0)).view(np.uint32).T  # + 0 turns -0 into 0
     order = np.lexsort((x, y, z))
     x, y, z = x[order], y[order], z[order]
     new = np.ones(len(order), np.int64)

@@ -1,4 +1,4 @@
-"""The shipped environments and surroundings, which lie beside the shipped scenes: they are content, like nodes."""
+"""The shipped environments and surroundings, stored beside the shipped scenes because they are content, like nodes."""
 
 from __future__ import annotations
 

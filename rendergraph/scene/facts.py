@@ -1,4 +1,4 @@
-"""What stages before the GPU and a node's `update` know of a scene: facts of its parts, and the scene of a frame."""
+"""Views of a scene for stages without a GPU and for `update`: facts of its parts, and the scene of a frame."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def material_facts(scene: Scene) -> tuple[MaterialFacts, ...]:
 
 
 def camera_facts(scene: Scene) -> CameraFacts:
-    """Of the first camera, which is the one that renders."""
+    """Return the facts of the first camera, which renders."""
     if (camera := scene.camera) is None:
         return CameraFacts()
     curve = scene.keyframes.get(f"cameras.{camera.name}.shutter")
@@ -88,20 +88,20 @@ def environment_facts(scene: Scene) -> TextureDesc | None:
     if scene.environment is None:
         return None
     size = scene.environment.size
-    assert size is not None  # readers of scenes measure it
+    assert size is not None  # set by the readers of scenes
     return TextureDesc("texture2d", "rgba16f", *size, mips=full_mip_count(*size))
 
 
 class FrameScene:
-    """The scene of a frame, the same for as long as no object moves; `steps.FrameScene` describes its properties.
+    """The scene of a frame, the same object while nothing moves; `steps.FrameScene` describes its properties.
 
     Attributes:
-        scene: of this frame.
-        placed: of the frame in which the objects came to where they are.
+        scene: the scene of this frame.
+        placed: the scene of the frame in which objects last moved.
     """
 
     def __init__(self, scene: Scene, before: FrameScene | None = None, decode: Decode | None = None) -> None:
-        """Share with the scene of the frames until now what has not changed; `decode` is for `pixels`."""
+        """Share unchanged values with the scene of the previous frames; `decode` is for `pixels`."""
         self.scene = self.placed = scene
         self.decode = decode
         if before is None or "corners" not in vars(before) or before.placed.meshes is not scene.meshes:
@@ -112,7 +112,7 @@ class FrameScene:
         if all(_flags(before.placed.objects[number]) == _flags(self.objects[number]) for number in moved):
             self.shown, self.casting = before.shown, before.casting
 
-    # `scene` is replaced while no object moves; lights may have changed nevertheless.
+    # `scene` is replaced even if no object moves, because lights may have changed.
     @property
     def lights(self) -> tuple[Light, ...]:
         return self.scene.lights
@@ -131,7 +131,7 @@ class FrameScene:
 
     @property
     def camera(self) -> Camera:
-        assert self.scene.camera is not None  # a scene that is drawn has been completed
+        assert self.scene.camera is not None  # `complete` has added one
         return self.scene.camera
 
     def pixels(self, image: ImageSource) -> npt.NDArray[np.float32]:

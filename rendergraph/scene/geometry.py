@@ -1,4 +1,4 @@
-"""Normals, triangles and affine matrices: the arithmetic that readers and shapes share."""
+"""Normals, triangles and affine matrices, for readers and shapes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Indices = npt.NDArray[np.uint32]
 
 
 def face_normals(positions: npt.ArrayLike, triangles: npt.NDArray[np.integer]) -> Doubles:
-    """Unit normals `(B-A)×(C-A)` of shape (m, 3); zero for triangles without area."""
+    """Return unit normals `(B-A)×(C-A)` of shape (m, 3); zero for triangles without area."""
     points = np.asarray(positions, np.float64)
     a, b, c = points[triangles[:, 0]], points[triangles[:, 1]], points[triangles[:, 2]]
     return unit(np.cross(b - a, c - a))
@@ -24,7 +24,7 @@ def face_normals(positions: npt.ArrayLike, triangles: npt.NDArray[np.integer]) -
 def mean_normals(
     normals: Doubles, corners: npt.NDArray[np.integer], faces: npt.NDArray[np.integer], count: int
 ) -> Doubles:
-    """The unit mean of the adjacent face normals (f, 3), `N = Σ Ni / n`, not weighted by area (techniques.md §1).
+    """Return unit means of the adjacent face normals (f, 3), `N = Σ Ni / n`, not weighted by area (techniques.md §1).
 
     `corners` and `faces`, (k,), are vertex and face of each corner; there are `count` vertices.
     """
@@ -33,7 +33,7 @@ def mean_normals(
 
 
 def filled_normals(positions: Floats, triangles: Indices, normals: Doubles) -> tuple[Floats, int]:
-    """Unit normals, zero ones replaced by the mean of the adjacent faces', and the number of replaced ones."""
+    """Return unit normals, with zero ones replaced by the mean over adjacent faces, and the number replaced."""
     result = unit(normals)
     zero = ~result.any(axis=1)
     missing = int(zero.sum())
@@ -46,7 +46,7 @@ def filled_normals(positions: Floats, triangles: Indices, normals: Doubles) -> t
 
 
 def flat(mesh: Mesh) -> Mesh:
-    """The same triangles with a separate vertex for each corner and the face's normal, without tangents."""
+    """Return the same triangles with a separate vertex for each corner and the face's normal, without tangents."""
     corners = mesh.indices.reshape(-1)
     normals = face_normals(mesh.positions, mesh.indices)
     normals[~normals.any(axis=1)] = (0.0, 0.0, 1.0)
@@ -56,7 +56,7 @@ def flat(mesh: Mesh) -> Mesh:
 
 
 def strip_triangles(indices: Indices) -> Indices:
-    """Triangles of a strip, every second one turned so that all have the same winding; those without area left out."""
+    """Return the triangles of a strip, all with the same winding, without those that have no area."""
     a, b, c = indices[:-2], indices[1:-1], indices[2:]
     odd = (np.arange(len(a)) & 1).astype(bool)
     triangles = np.stack([a, np.where(odd, c, b), np.where(odd, b, c)], axis=1)
@@ -81,7 +81,7 @@ def translation(at: npt.ArrayLike) -> Matrix:
 
 
 def euler_matrix(degrees: Sequence[float]) -> Matrix:
-    """Rotation (3, 3) about X, then Y, then Z (`Rz·Ry·Rx`), angles in degrees."""
+    """Return the rotation (3, 3) about X, then Y, then Z (`Rz·Ry·Rx`), angles in degrees."""
     (cx, cy, cz), (sx, sy, sz) = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     rx = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
     ry = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
@@ -90,7 +90,7 @@ def euler_matrix(degrees: Sequence[float]) -> Matrix:
 
 
 def placement(at: Sequence[float], rotation: Matrix, scale: Sequence[float]) -> Matrix:
-    """Scale, then rotate, then move: `T·R·S` as (4, 4)."""
+    """Return the transform that scales, then rotates, then translates: `T·R·S` as (4, 4)."""
     matrix = np.eye(4)
     matrix[:3, :3] = rotation * np.asarray(scale, np.float64)
     matrix[:3, 3] = at
@@ -98,7 +98,7 @@ def placement(at: Sequence[float], rotation: Matrix, scale: Sequence[float]) -> 
 
 
 def rigid(matrix: Matrix) -> Matrix:
-    """A transform without its scale and shear, for cameras: -Z and +Y keep their directions as well as they can."""
+    """Return a transform without scale and shear, for cameras: -Z keeps its direction, and +Y if possible."""
     back = unit(matrix[:3, 2])
     side = unit(np.cross(matrix[:3, 1], back))
     if not back.any() or not side.any():

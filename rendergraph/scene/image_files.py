@@ -1,4 +1,4 @@
-"""Image files: their format, size and channels, found by OpenImageIO before anything is decoded.
+"""Image files: their format, size and channels, read by OpenImageIO before anything is decoded.
 
 Images are untrusted. Only regular files of six formats, recognised by their first bytes, are opened, and the header is
 checked against the limits; mistakes are ImageErrors. `images.decode` continues with the opened file.
@@ -42,7 +42,7 @@ class ImageError(Exception):
 
 
 class ImageFile(Struct):
-    """An opened image; `kind` is the extension of its format, `bytes` the length of the file."""
+    """An opened image; `kind` is the extension of its format, `bytes` the size of the file."""
 
     kind: str
     path: str
@@ -52,11 +52,11 @@ class ImageFile(Struct):
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height of the decoded image; an EXR file may store a part of it, or more."""
+        """Width and height of the decoded image; an EXR file may store only a part of it, or more."""
         return self.spec.full_width, self.spec.full_height
 
     def read(self, channels: range, kind: str | None, limits: SceneLimits) -> Any:
-        """Pixels of these channels, as `kind` or as the file stores them."""
+        """Return the pixels of these channels, as `kind` or as the file stores them."""
         import OpenImageIO as oiio  # loaded with the first picture read
 
         texel = oiio.TypeDesc(kind) if kind else self.spec.format
@@ -72,7 +72,7 @@ class ImageFile(Struct):
         if self.handle.format_name() != _FORMATS[self.kind]:
             raise ImageError("RG351", f"is not what it claims to be; {READ}")
         if self.spec.deep:
-            raise ImageError("RG354", "is deep (several samples a pixel); flatten it first")
+            raise ImageError("RG354", "is deep (several samples per pixel); flatten it first")
         if self.spec.nchannels > MOST_CHANNELS:
             raise ImageError("RG353", f"has {self.spec.nchannels} channels, the limit is {MOST_CHANNELS}")
         if self.spec.depth > 1:
@@ -83,7 +83,7 @@ class ImageFile(Struct):
         return max(self.spec.width, self.spec.full_width), max(self.spec.height, self.spec.full_height)
 
     def color_channels(self) -> range:
-        """The channels that are the colour, next to each other as OpenImageIO sorts them."""
+        """Return the colour channels, which are consecutive in OpenImageIO's order."""
         names = [name.upper() for name in self.spec.channelnames]
         if self.kind != ".exr":
             return range(min(len(names), 4))
@@ -103,7 +103,7 @@ class ImageFile(Struct):
 def read_header(source: ImageSource, limits: SceneLimits) -> tuple[tuple[int, int], int]:
     """Return the size of the decoded image, width and height, and the number of its channels."""
     head, size = _first_bytes(source)
-    if _kind_of(head, source) == ".jpg":  # OpenImageIO decodes a progressive one while it opens it
+    if _kind_of(head, source) == ".jpg":  # OpenImageIO decodes a progressive JPEG when opening it
         width, height, channels = _jpeg_frame(source)
         _check_size(width, height, size, limits)
         return (width, height), channels
@@ -131,7 +131,7 @@ def open_image(source: ImageSource, limits: SceneLimits) -> Iterator[ImageFile]:
         import OpenImageIO as oiio  # loaded with the first picture read
     except ImportError as error:
         raise ImageError("RG350", f"cannot be read: OpenImageIO is not available ({error})") from None
-    if kind == ".jpg":  # it and a compressed BMP may be decoded while they are opened
+    if kind == ".jpg":  # JPEGs and compressed BMPs may be decoded on opening
         _check_size(*_jpeg_frame(source)[:2], size, limits)
     elif kind == ".bmp" and len(head) >= 26 and head[14] > 12:
         width, height = struct.unpack_from("<ii", head, 18)
@@ -152,12 +152,12 @@ def open_image(source: ImageSource, limits: SceneLimits) -> Iterator[ImageFile]:
 
 @contextlib.contextmanager
 def _readable_path(source: ImageSource, kind: str) -> Iterator[str]:
-    """A path for OpenImageIO, which chooses the decoder by the extension and reads no memory."""
+    """Yield a path for OpenImageIO, which chooses the decoder by extension and cannot read from memory."""
     path = os.path.abspath(source.path)
     if source.data is None and Path(path).suffix.lower() == kind and is_text(path):
         yield path
         return
-    import tempfile  # for such images alone
+    import tempfile  # only for such images
 
     with tempfile.TemporaryDirectory(prefix="rendergraph-") as folder:
         other = Path(folder, f"image{kind}")
@@ -182,7 +182,7 @@ def _first_bytes(source: ImageSource, count: int = 32) -> tuple[bytes, int]:
 
 
 def _kind_of(head: bytes, source: ImageSource) -> str:
-    """The extension of the format; TGA has no magic number and goes by the name."""
+    """Return the extension of the format; TGA has no magic number, so the name decides."""
     if not head:
         raise ImageError("RG352", "is broken: the file is empty")
     for magic, kind in _MAGIC.items():
@@ -194,7 +194,7 @@ def _kind_of(head: bytes, source: ImageSource) -> str:
 
 
 def _check_size(width: int, height: int, size: int, limits: SceneLimits, texel_bytes: int = 4) -> None:
-    """Check a decoded image of at least four bytes a texel, whose file has `size` bytes, against the limits."""
+    """Check a decoded image of at least four bytes per texel, whose file has `size` bytes, against the limits."""
     if max(width, height) > limits.image_side:
         raise ImageError("RG353", limits.exceeded(f"is {width}×{height} pixels", "image_side"))
     decoded = width * height * max(4, texel_bytes)
@@ -206,7 +206,7 @@ def _check_size(width: int, height: int, size: int, limits: SceneLimits, texel_b
 
 
 def _error_of(thing: Any) -> str:
-    """OpenImageIO's message; it may quote bytes of the file, which need not be text."""
+    """Return OpenImageIO's message; it may quote bytes of the file, which need not be text."""
     try:
         return str(thing.geterror())
     except UnicodeDecodeError as error:
@@ -220,7 +220,7 @@ def _one_line(problem: str, path: str) -> str:
 
 
 def is_text(path: str) -> bool:
-    """Whether a path is text; names of files may be any bytes."""
+    """Return whether a path is text; file names may be any bytes."""
     try:
         path.encode()
     except UnicodeEncodeError:
@@ -231,7 +231,7 @@ def is_text(path: str) -> bool:
 class _Silence:
     """Keeps libpng from writing to stderr.
 
-    Images are opened in several threads: the first one in redirects, the last one out restores.
+    Images are opened in several threads: the first one to enter redirects, the last one to leave restores.
     """
 
     def __init__(self) -> None:
@@ -246,7 +246,7 @@ class _Silence:
                 return
             try:
                 self._stderr = os.dup(2)
-            except OSError:  # no stderr at all
+            except OSError:  # the process has no stderr
                 return
             devnull = os.open(os.devnull, os.O_WRONLY)
             os.dup2(devnull, 2)

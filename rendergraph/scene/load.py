@@ -26,10 +26,10 @@ def load(
 ) -> Scene:
     """Load the scene in a file and check all of it; the extension chooses the reader.
 
-    The scene is as the file has it: `animate.complete` adds a camera and a light if there are none. What a reader left
-    out, replaced or clamped is in `warnings`. `check_path` is the root rule for every path in the file; by default
-    paths stay under the file's own folder, links followed. `changes`, with the keys of scene files, are merged into
-    the scene; without a file they are the scene.
+    The scene has only what the file has: `animate.complete` adds a camera and a light if there are none. `warnings`
+    lists what a reader left out, replaced or clamped. `check_path` is the root rule for every path in the file; by
+    default paths stay under the file's own folder, with symbolic links resolved. `changes`, with the keys of scene
+    files, are merged into the scene; without a file they are the scene.
     """
     reading = Reading(path or Path("scene.yaml"), check_path or inside((path or Path("x")).parent), limits, extensions)
     suffix = path.suffix.lower() if path is not None else ""
@@ -43,7 +43,7 @@ def load(
         unknown = Problem("RG303", f"'{shown(path.name)}' is not a scene; a scene ends in", Place(str(path)))
         scene = read_mesh(path, reading, unknown, EXTENSIONS)
         if scene.rigs:
-            from rendergraph.scene.animate import at_rest, play  # for animated files alone
+            from rendergraph.scene.animate import at_rest, play  # only for animated files
 
             scene = play(scene) if scene.rigs[0].clips else at_rest(scene)
     return replace(scene, warnings=reading.warnings)

@@ -1,4 +1,4 @@
-"""Meshes from files: in shipped formats, and in those of plugins."""
+"""Meshes from files, in shipped formats and in those of plugins."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _WIDTHS = {"positions": (3,), "normals": (3,), "uv0": (2,), "uv1": (2,), "colors
 
 
 def read_mesh(path: Path, reading: Reading, unknown: Problem, known: tuple[str, ...] = MESHES) -> Scene:
-    """Read the scene in a mesh file; `unknown` is the mistake if it has none of the `known` or plugins' extensions."""
+    """Read a mesh file as a scene; `unknown` is the problem if its extension is neither `known` nor a plugin's."""
     extension = path.suffix.lower()
     if extension in MESHES:
         return read(path, reading)
@@ -39,7 +39,7 @@ def read_mesh(path: Path, reading: Reading, unknown: Problem, known: tuple[str, 
 
 
 def _read_plugin_scene(path: Path, loader: Added[SceneLoader], reading: Reading) -> Scene:
-    """The scene of a plugin's loader, which says of mistakes in the file itself."""
+    """Return the scene of a plugin's loader, which reports mistakes in the file itself."""
     reading.check_file(path, "scene file")
     what = f"scene '{shown(path.name)}'"
     result = loader.run("RG497", f"{what} cannot be read", path, reading)
@@ -52,7 +52,7 @@ def _read_plugin_scene(path: Path, loader: Added[SceneLoader], reading: Reading)
 
 
 def _read_plugin_mesh(path: Path, loader: Added[MeshLoader], reading: Reading) -> Scene:
-    """The scene of a plugin's loader: an object for each `MeshData`, whose arrays are all checked."""
+    """Return the scene of a plugin's loader: an object for each `MeshData`, whose arrays are all checked."""
     reading.check_file(path, "scene file")
     reading.check_bytes(path, "mesh")
     what = f"mesh '{shown(path.name)}'"
@@ -88,7 +88,7 @@ def _unusable(loader: Added[Any], what: str, text: str) -> InputError:
 
 
 def check_mesh(part: MeshData, name: str = "") -> Mesh:
-    """Return the mesh of arrays; a mistake is a ValueError whose text begins with the attribute's name."""
+    """Return the mesh of arrays; raise ValueError for a mistake, with a text that begins with the attribute's name."""
     arrays = {key: _floats(key, getattr(part, key)) for key in _WIDTHS}
     positions = arrays.pop("positions")
     if positions is None or not len(positions):
@@ -110,7 +110,7 @@ def check_mesh(part: MeshData, name: str = "") -> Mesh:
 def _floats(key: str, values: npt.ArrayLike | None) -> Floats | None:
     if values is None:
         return None
-    with np.errstate(over="ignore"):  # what single precision cannot hold becomes infinite
+    with np.errstate(over="ignore"):  # values beyond single precision become infinite
         array = np.ascontiguousarray(values, np.float32)
     if array.ndim != 2 or array.shape[1] not in _WIDTHS[key]:
         expected = " or ".join(f"(n, {width})" for width in _WIDTHS[key])

@@ -37,23 +37,23 @@ T = TypeVar("T", bound=np.floating[Any])
 
 
 FARTHEST = 1e12
-"""No number of a mesh is larger: products of a few would leave single precision."""
+"""Limit of numbers in a mesh: products of a few larger ones would exceed single precision."""
 
 _LAYERED = ("clearcoat", "sheen_color", "iridescence", "transmission", "shadow_catcher")
 _LAYERS = {key: key.removesuffix("_color") for key in _LAYERED}
 _REFLECTANCE = ("ior", "specular", "specular_color")
 _MOST_CONVEX = 10_000_000
-"""Pairs of vertex and triangle that are looked at to see whether a mesh is convex: about a tenth of a second."""
+"""Limit of pairs of vertex and triangle in the test for convexity: about a tenth of a second."""
 
 
 def extremes(points: npt.NDArray[T]) -> tuple[npt.NDArray[T], npt.NDArray[T]]:
-    """Return the least and the greatest of each coordinate of points (n, 3), (3,) each."""
-    columns = np.ascontiguousarray(points.T)  # along rows of three NumPy takes thirty times as long
+    """Return the minimum and maximum of each coordinate of points (n, 3), (3,) each."""
+    columns = np.ascontiguousarray(points.T)  # along rows of three, NumPy takes thirty times as long
     return columns.min(axis=1), columns.max(axis=1)
 
 
 class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
-    """Triangles with their vertex attributes, one material's worth of geometry.
+    """Triangles of one material with their vertex attributes.
 
     Attributes:
         positions: float32 (n, 3), finite.
@@ -62,7 +62,7 @@ class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
         tangents: float32 (n, 4), w the handedness, or None: the shader derives them.
         uv0, uv1: float32 (n, 2), or None.
         colors: float32 (n, 4) linear, or None for white.
-        deform: how its vertices move, for an animated mesh; all else is then that of its bind pose.
+        deform: how the vertices of an animated mesh move; the other attributes are then those of the bind pose.
     """
 
     name: str
@@ -82,9 +82,9 @@ class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
 
     @cached_property
     def plane(self) -> tuple[float, float, float, float] | None:
-        """The plane (a, b, c, d), a x + b y + c z + d = 0, that all its triangles lie in, or None.
+        """The plane (a, b, c, d), a x + b y + c z + d = 0, that contains all triangles, or None.
 
-        Its normal is of unit length, and on the side that the triangles show.
+        Its unit normal is on the front side of the triangles.
         """
         a, b, c = np.moveaxis(self.positions.astype(np.float64)[self.indices], 1, 0)
         normal = np.cross(b - a, c - a).sum(axis=0)
@@ -101,12 +101,12 @@ class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
 
     @cached_property
     def solid(self) -> bool:
-        """Whether it is closed and encloses a volume, so that from outside its front faces hide its back faces."""
+        """Whether it is closed and encloses a volume, so that its front faces hide its back faces from outside."""
         return is_solid(self.positions, self.indices)
 
     @cached_property
     def convex(self) -> bool:
-        """Whether it is closed with every vertex behind every triangle; False, too, where it is too large to ask."""
+        """Whether it is closed with every vertex behind every triangle; also False if it is too large to test."""
         triangles = self.edges.triangles
         if self.deform is not None or self.edges.gap or len(triangles) * len(self.positions) > _MOST_CONVEX:
             return False
@@ -124,14 +124,14 @@ class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
 
 
 class SceneLimits(Struct, frozen=True):
-    """How much a scene may ask for.
+    """Limits of scenes, which are untrusted.
 
     Attributes:
         file_bytes: bytes of one mesh or buffer file.
         vertices: vertices of one scene, before and after corners are split.
         objects: placed objects of one scene.
         lights: lights of one scene file.
-        memory_bytes: memory for what a file declares without containing it, such as accessors without a view.
+        memory_bytes: memory for data that a file declares without containing it, such as accessors without a view.
         image_side: texels along one side of an image.
         image_bytes: decoded bytes of one image.
         image_ratio: decoded bytes for each byte of the file, if an image is above 64 MiB.
@@ -162,13 +162,13 @@ class GeneratedTexture(Struct, frozen=True):
 
 
 class ImageSource(Struct, frozen=True):
-    """An image not yet decoded: a file, bytes inside another file, or one that is generated.
+    """An image that has not been decoded: a file, bytes inside another file, or a generated image.
 
     Attributes:
-        path: the file it comes from, also if `data` has its bytes.
+        path: the file that it comes from, even if `data` has its bytes.
         data: the encoded bytes of an embedded image.
-        size: width and height of the decoded image; None if only decoding tells.
-        channels: in the file; 0 if unknown.
+        size: width and height of the decoded image; None if unknown before decoding.
+        channels: number of channels in the file; 0 if unknown.
     """
 
     path: Path
@@ -199,7 +199,7 @@ class Texture(Struct, frozen=True):
         srgb: decoded with the sRGB curve (base colour, emissive).
         min_filter: `nearest`, `linear` (no mips), `nearest_mipmap_nearest`, … as in glTF.
         uv: which UV set, 0 or 1.
-        transform: KHR_texture_transform as a 2×3 matrix on (u, v, 1), row by row; None for identity.
+        transform: KHR_texture_transform as a 2×3 matrix on (u, v, 1), row-major; None for identity.
     """
 
     image: ImageSource
@@ -213,23 +213,23 @@ class Texture(Struct, frozen=True):
 
 
 class Material(Struct, frozen=True):
-    """A surface; names and meanings are glTF's, in snake case.
+    """A surface material; names and meanings are those of glTF, in snake case.
 
     Attributes:
         base_color: linear RGBA factor.
-        emissive: linear RGB factor, `emissive_strength` already multiplied in.
+        emissive: linear RGB factor, including `emissive_strength`.
         ior: index of refraction; dielectric f0 is ((ior-1)/(ior+1))².
         specular, specular_color: as in KHR_materials_specular, linear RGB.
         anisotropy_strength, anisotropy_rotation: as in KHR_materials_anisotropy, radians.
-        clearcoat, sheen_color, iridescence, transmission: factors of the layers, with what belongs to each, as in the
-            KHR_materials_ extensions; distances in metres, `iridescence_thickness` in nanometres where its texture
-            is 0 and 1 (without one the second counts).
-        shadow_catcher: shows what is behind it, as dark as shadows and occlusion make it.
+        clearcoat, sheen_color, iridescence, transmission: factors of the layers, with their other parameters, as in
+            the KHR_materials_ extensions; distances in metres, `iridescence_thickness` in nanometres for texture
+            values 0 and 1 (without a texture the second applies).
+        shadow_catcher: shows the background, darkened by shadows and occlusion.
         textures: by slot: `base_color`, `metallic_roughness`, `normal`, `occlusion`, `emissive`, `anisotropy`,
             `specular`, `specular_color`, and those of the layers.
-        ambient, diffuse, specular_phong, shininess: an OBJ's Ka, Kd, Ks, Ns where the MTL gives no Pr/Pm; None where
-            the material is metallic-roughness (design.md §8 says how one is derived from the other).
-        extra: values of plugins' keys, also of objects, lights and cameras.
+        ambient, diffuse, specular_phong, shininess: an OBJ's Ka, Kd, Ks, Ns if the MTL gives no Pr/Pm; None if the
+            material is metallic-roughness (design.md §8 derives one from the other).
+        extra: values of plugins' keys, as in objects, lights and cameras.
     """
 
     name: str
@@ -277,9 +277,9 @@ class Object(Struct, frozen=True, eq=False):
         name: node or `o` name, unique within its file.
         mesh, material: indices into `Scene.meshes` and `Scene.materials`.
         transform: object to world, float64 (4, 4), affine.
-        node: the name of the node it is a part of, shared by the parts of one node (one for each material, or each
-            instance); a scene file's `overrides` name it.
-        pose: what moves the vertices of an animated mesh; no object of another pose has this mesh.
+        node: the name of its node, shared by all parts of the node (one per material or instance); a scene file's
+            `overrides` name it.
+        pose: the pose of an animated mesh; objects with another pose do not share the mesh.
     """
 
     name: str
@@ -301,7 +301,7 @@ class Light(Struct, frozen=True):
         direction: unit vector the light travels along; unused for point.
         color: linear RGB.
         intensity: lux for directional, candela for point and spot.
-        range: metres where the inverse-square falloff is windowed to zero, None for no window.
+        range: metres at which the inverse-square falloff is windowed to zero, None for no window.
         inner, outer: half angles of the spot's cone in radians.
         casts_shadow: whether `shadow_map.light: auto` may choose it.
     """
@@ -329,9 +329,9 @@ class Camera(Struct, frozen=True, eq=False):
         height: full height in metres (orthographic); the width follows the picture's aspect.
         frustum: left, right, bottom, top at the near plane in metres.
         near, far: metres; far may be infinite for perspective.
-        target: the point it was aimed at, for orbits; None where unknown.
-        shutter: how much of a frame's time it is open, centred on the frame's moment.
-        aspect: width over height of a picture whose size nothing says.
+        target: the point that it looks at, for orbits; None if unknown.
+        shutter: the fraction of a frame's time for which it is open, centred on the frame's time.
+        aspect: width over height of pictures whose size is not given.
     """
 
     name: str
@@ -352,12 +352,12 @@ class Environment(Struct, frozen=True):
     """An equirectangular image around the scene.
 
     Attributes:
-        size: width and height of the decoded image; None if only decoding tells.
+        size: width and height of the decoded image; None if unknown before decoding.
         intensity: factor on its radiance.
         rotate: radians about +Y.
-        sun: the sun of a sky, in the directions of the image, for a scene that has no directional light; else None.
-        projection: the point from which shadow catchers show the image, x, y and z in metres, and the distance from
-            there at which they show it as the background does; all 0 if they do everywhere.
+        sun: the sun of a sky, in the image's coordinates, for a scene without a directional light; else None.
+        projection: the point from which the image is projected on shadow catchers, x, y and z in metres, and the
+            distance from there at which they match the background; all 0 if they match everywhere.
     """
 
     image: ImageSource | MadeImage
@@ -379,9 +379,9 @@ class Environment(Struct, frozen=True):
 
 
 class Orbit(Struct, frozen=True):
-    """A camera that turns about its target, counter-clockwise seen from above; the default one where unnamed.
+    """A camera that orbits its target, counter-clockwise seen from above; the default camera if unnamed.
 
-    At the time `begin`, in seconds, it is where it stands.
+    At the time `begin`, in seconds, it is at its own position.
     """
 
     camera: str
@@ -398,22 +398,22 @@ class Placement(Struct, frozen=True, eq=False):
 
 
 class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
-    """Everything that can be drawn, with its lights and cameras.
+    """Objects with their meshes and materials, lights and cameras.
 
     Attributes:
         cameras: by name, the first is the default.
         keyframes: dotted path to values over time.
-        follows: by camera the indices of the objects that it looks at.
-        warnings: what a reader left out, replaced or clamped, once for each kind and file.
+        follows: by camera, the indices of the objects that it looks at.
+        warnings: what a reader left out, replaced or clamped, once per kind and file.
         recipe: section and name (`("cameras", "main")`) to the values in the scene file, which keyframes change.
         placements: name of a scene file's object, or of one copy of it, to its parts; "" for all of an animated file.
-        rigs: what moves animated files.
+        rigs: the rigs of animated files.
         copies: section and name of a scene file's entry to its `repeat.Copies`.
         plugin_keys: section to the names of the plugins' keys that its file may use.
-        files: every file accessed while reading it, as it was.
-        ground: whether to add a ground, and from which height the environment is projected on it, in metres; 0 suits
-            the objects.
-        variants: by name the materials of the objects that look different in it (KHR_materials_variants).
+        files: stamps of all files that were read.
+        ground: whether to add a ground, and the height in metres from which the environment is projected on it; 0
+            chooses a height for the objects.
+        variants: by name, the materials of objects that differ in the variant (KHR_materials_variants).
     """
 
     name: str
@@ -445,21 +445,21 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         return replace(self, objects=tuple(objects))
 
     def variant_mistake(self, name: str) -> str | None:
-        """Return what is wrong with the name of a variant; None if there is such a variant."""
+        """Return why a variant's name is wrong; None if the variant exists."""
         known = f"it has {', '.join(map(repr, self.variants))}" if self.variants else "it has none"
         return None if name in self.variants else f"has no variant '{shown(name)}'; {known}"
 
     @cached_property
     def catchers(self) -> list[int]:
-        """Numbers of the objects that are shadow catchers."""
+        """Indices of the objects that are shadow catchers."""
         catching = {number for number, material in enumerate(self.materials) if material.shadow_catcher}
         return [number for number, entry in enumerate(self.objects) if catching and entry.material in catching]
 
     @cached_property
     def bounds(self) -> tuple[Vec3, Vec3]:
-        """Least and greatest corner of the transformed boxes of everything drawn; a unit cube if nothing is.
+        """Minimum and maximum corner of the transformed boxes of everything drawn; a unit cube if nothing is drawn.
 
-        Shadow catchers do not count: a ground is as large as the surroundings.
+        Shadow catchers do not count, because a ground is as large as the surroundings.
         """
         catchers = set(self.catchers)
         shown = [entry for number, entry in enumerate(self.objects) if not entry.hidden and number not in catchers]
@@ -474,7 +474,7 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
 
     @cached_property
     def tracks(self) -> tuple[tuple[str, str, tuple[tuple[str, Curve], ...]], ...]:
-        """The keyframes by section and entry: those of one entry, each with its key."""
+        """The keyframes by section and entry, each with its key."""
         found: dict[tuple[str, str], list[tuple[str, Curve]]] = {}
         for path, curve in self.keyframes.items():
             section, _, rest = path.partition(".")
@@ -503,7 +503,7 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         return () if material.unlit else tuple(_LAYERS[key] for key in _LAYERS if has[key])
 
     def is_blended(self, material: Material) -> bool:
-        """Whether opaque surfaces are seen through a material: by its alpha, or as it transmits light."""
+        """Return whether a material lets surfaces behind it show, by alpha or transmission."""
         return material.alpha_mode == "blend" or "transmission" in self.layers(material)
 
     def emits(self, material: Material) -> bool:
@@ -533,5 +533,5 @@ def boxes_of(meshes: tuple[Mesh, ...], objects: Sequence[Object]) -> Matrix:
 
 
 def changed_objects(before: Scene, scene: Scene) -> list[int]:
-    """The objects that are not the very same in two scenes that share their meshes."""
+    """Return the objects that are not identical in two scenes that share their meshes."""
     return list(compress(count(), map(is_not, before.objects, scene.objects)))

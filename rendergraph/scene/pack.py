@@ -1,6 +1,6 @@
-"""A scene as arrays for the GPU, packed once: geometry streams, instance records, materials, lights and views.
+"""Pack a scene into arrays for the GPU: geometry streams, instance records, materials, lights and views.
 
-Layouts are those of the GLSL structs in `shaders/include/` (std140: everything is a vec4 or a mat4 by columns). Bytes:
+Layouts are those of the GLSL structs in `shaders/include/` (std140: only vec4 and column-major mat4). Sizes in bytes:
 `View` 448, `Light` 64, `MaterialData` 128 (208 with layers), an instance record 56.
 """
 
@@ -32,7 +32,7 @@ SLOTS = (
     *("clearcoat", "clearcoat_roughness", "clearcoat_normal", "sheen_color", "sheen_roughness"),
     *("iridescence", "iridescence_thickness", "transmission", "thickness"),
 )
-"""Texture slots in the order of a material's rows in `material_uvs`; those of layers from the ninth on."""
+"""Texture slots in the order of a material's rows in `material_uvs`; slots of layers start at the ninth."""
 
 _VEC4 = ("<f4", (4,))
 INSTANCE = np.dtype([("rows", "<f4", (3, 4)), ("ids", "<i4", (2,))])
@@ -44,12 +44,12 @@ MESH = np.dtype(
         "formats": [_UINT, _UINT, "<i4", _UINT, _VEC3, _VEC3],
     }
 )
-"""Where a mesh lies in the streams: first index, number of indices, base vertex, number of vertices, its box."""
+"""The location of a mesh in the streams: first index, index count, base vertex, vertex count, and its box."""
 _MATERIAL_ROWS = "base_color emissive surface specular extra phong_diffuse phong_specular phong_ambient"
 MATERIAL = np.dtype([(name, *_VEC4) for name in _MATERIAL_ROWS.split()])
 _LAYER_ROWS = "clearcoat sheen iridescence transmission absorption"
 LAYERED_MATERIAL = np.dtype([(name, *_VEC4) for name in (*_MATERIAL_ROWS.split(), *_LAYER_ROWS.split())])
-"""The records of scenes where some material has a layer (`LAYERED_MATERIALS`)."""
+"""The records of scenes in which a material has a layer (`LAYERED_MATERIALS`)."""
 ENVIRONMENT = np.dtype([(name, *_VEC4) for name in ("environment_transform", "environment_projection")])
 LIGHT = np.dtype([(name, *_VEC4) for name in ("position", "color", "direction", "cone")])
 _MATRICES = "view projection view_projection inverse_view inverse_projection inverse_view_projection"
@@ -58,8 +58,8 @@ VIEW = np.dtype(
     [(name, *_MATRIX) for name in _MATRICES.split()]
     + [(name, *_VEC4) for name in ("eye", "viewport", "range", "jitter")]
 )
-_ROUNDING = 4 * 2.0**-23  # of a sum of four products in float32, relative to their sizes
-_FARTHEST_EYE = 1e9  # metres; one that is farther off is a direction, whatever rounding says
+_ROUNDING = 4 * 2.0**-23  # error of a sum of four products in float32, relative to their sizes
+_FARTHEST_EYE = 1e9  # metres; a more distant eye is treated as a direction
 _WIDTHS = {"positions": 3, "normals": 3, "tangents": 4, "uv0": 2, "uv1": 2, "colors": 4}
 _LIGHT_TYPES = {"directional": 0.0, "point": 1.0, "spot": 2.0}
 
@@ -69,18 +69,17 @@ class PackedScene(Struct, frozen=True, eq=False):
 
     Attributes:
         positions, normals: float32 (v, 3).
-        tangents: float32 (v, 4), zero for meshes without; None where no mesh has tangents. So with `uv0`, `uv1` (v, 2)
-            and `colors` (v, 4), white for meshes without.
-        indices: uint32 (i,), relative to the mesh's base vertex, three a triangle.
-        instances: one an object in the scene's order; a draw of objects that are not neighbours gathers their records
-            into its own order.
-        material_uvs: float32 (m, 2 s, 4): per material two rows (a, b, c, 0) of the uv transform for each of the first
-            s `SLOTS`, which `slot_count` tells.
+        tangents: float32 (v, 4), zero for meshes without; None if no mesh has tangents. The same holds for `uv0`,
+            `uv1` (v, 2) and `colors` (v, 4), which are white for meshes without.
+        indices: uint32 (i,), relative to the mesh's base vertex, three per triangle.
+        instances: one per object, in the scene's order; a draw of non-consecutive objects gathers their records.
+        material_uvs: float32 (m, 2 s, 4): per material two rows (a, b, c, 0) of the uv transform for each of s =
+            `slot_count` slots.
         material_moved: bool (m,), whether any slot's transform is not the identity (`HAS_UV_TRANSFORM`).
-        mirrored: bool (n,), the transform turns the winding round (determinant below 0).
-        centers, extents: float64 (n, 3), middles and half sides of world-space bounding boxes.
-        slack: float64 (n, 1), metres that rounding may move an object's vertices by on the GPU.
-        vertex_orders: by animated mesh where each of its packed vertices is in the mesh.
+        mirrored: bool (n,), the transform reverses the winding (determinant below 0).
+        centers, extents: float64 (n, 3), centres and half sizes of world-space bounding boxes.
+        slack: float64 (n, 1), metres by which rounding may move an object's vertices on the GPU.
+        vertex_orders: by animated mesh, the index in the mesh of each packed vertex.
     """
 
     positions: Floats
@@ -111,7 +110,7 @@ class PackedScene(Struct, frozen=True, eq=False):
 
 
 def pack(scene: Scene) -> PackedScene:
-    """Lay a scene out for the GPU; triangles in vertex-cache order, vertices in the order of first use."""
+    """Pack a scene for the GPU, with triangles in vertex-cache order and vertices in the order of first use."""
     orders = [first_use(ordered(mesh.positions, mesh.indices), len(mesh.positions)) for mesh in scene.meshes]
     vertices = [old for old, _ in orders]
     streams = {name: _stream(scene.meshes, vertices, name, width) for name, width in _WIDTHS.items()}
@@ -137,8 +136,8 @@ def pack(scene: Scene) -> PackedScene:
 def with_adjacency(packed: PackedScene) -> tuple[npt.NDArray[np.uint32], Records]:
     """Return indices of triangles with adjacency, six for each triangle, and the `MESH` records that locate them.
 
-    Every second index is a corner, and the next one the vertex across the edge from there to the next corner. Meshes
-    that are not closed have none.
+    Each corner's index is followed by that of the vertex across the edge to the next corner. Meshes that are not
+    closed have none.
     """
     records = packed.meshes.copy()
     parts = [np.zeros(0, np.uint32)]
@@ -160,9 +159,9 @@ def blocks(packed: PackedScene) -> dict[str, Records | Floats]:
 
 
 def update(packed: PackedScene, before: Scene, scene: Scene) -> PackedScene:
-    """Return the same geometry with the objects, materials and lights of a scene that shares its meshes: a later frame.
+    """Return the packed scene of a later frame: the same geometry with new objects, materials and lights.
 
-    Parts that are the very same in the scene `before` are not packed again.
+    Parts that are identical in the scene `before` are not packed again.
     """
     changed: dict[str, Any] = {}
     if scene.lights is not before.lights:
@@ -177,7 +176,7 @@ def update(packed: PackedScene, before: Scene, scene: Scene) -> PackedScene:
 
 
 def _moved(packed: PackedScene, before: Scene, scene: Scene) -> dict[str, Any]:
-    """What objects are packed to of which some have moved: their records are made anew, those of the others copied."""
+    """Return the packed fields of objects: records of moved objects are rebuilt, the others copied."""
     was, now = before.objects, scene.objects
     moved = changed_objects(before, scene)
     free = {"transform": 0, "extra": 0, "pose": 0}
@@ -228,7 +227,7 @@ def _placed(scene: Scene, meshes: Records) -> dict[str, Any]:
 
 
 def _stream(meshes: Sequence[Mesh], orders: Sequence[npt.NDArray[np.int64]], name: str, width: int) -> Floats | None:
-    """One attribute of all meshes one after the other; None if no mesh has it (positions and normals always are)."""
+    """Return one attribute of all meshes, concatenated; None if no mesh has it (positions and normals always exist)."""
     if name not in ("positions", "normals") and all(getattr(mesh, name) is None for mesh in meshes):
         return None
     stream = np.full((sum(map(len, orders)), width), 1.0 if name == "colors" else 0.0, np.float32)
@@ -242,12 +241,12 @@ def _stream(meshes: Sequence[Mesh], orders: Sequence[npt.NDArray[np.int64]], nam
 
 
 def slot_count(materials: Sequence[Material]) -> int:
-    """Return how many `SLOTS` a scene's tables have: all if a texture of a layer is there, else the first eight."""
+    """Return how many `SLOTS` a scene's tables have: all if a layer has a texture, else the first eight."""
     return len(SLOTS) if any(slot in SLOTS[8:] for material in materials for slot in material.textures) else 8
 
 
 def pack_materials(materials: Sequence[Material], layered: bool = False) -> Records:
-    """`MaterialData` records (shaders/include/materials.glsl), `layered` or without what layers need."""
+    """Return `MaterialData` records (shaders/include/materials.glsl), with fields of layers if `layered`."""
     table = np.zeros(len(materials), LAYERED_MATERIAL if layered else MATERIAL)
     for record, material in zip(table, materials, strict=True):
         ambient, diffuse, specular, n = phong_of(material)
@@ -260,7 +259,7 @@ def pack_materials(materials: Sequence[Material], layered: bool = False) -> Reco
         record["phong_specular"] = (*specular, 0.0)
         record["phong_ambient"] = (*ambient, 0.0)
         if layered:
-            # Of light that travels a metre, exp(-absorption) is left; black would absorb without end.
+            # Transmittance over a metre is exp(-absorption), which would be infinite for black.
             left = np.maximum(material.attenuation_color, 1e-6)
             record["clearcoat"] = (material.clearcoat, material.clearcoat_roughness, material.clearcoat_normal_scale, 0)
             record["sheen"] = (*material.sheen_color, material.sheen_roughness)
@@ -271,7 +270,7 @@ def pack_materials(materials: Sequence[Material], layered: bool = False) -> Reco
 
 
 def pack_material_uvs(materials: Sequence[Material]) -> tuple[Floats, Bools]:
-    """Two rows (a, b, c, 0) for each slot of each material, `u' = a·u + b·v + c`; and which materials need them."""
+    """Return two rows (a, b, c, 0) per slot and material, `u' = a·u + b·v + c`, and which materials need them."""
     slots = slot_count(materials)
     rows = np.zeros((len(materials), slots, 2, 4), np.float32)
     rows[:, :, 0, 0] = rows[:, :, 1, 1] = 1.0
@@ -285,7 +284,7 @@ def pack_material_uvs(materials: Sequence[Material]) -> tuple[Floats, Bools]:
 
 
 def pack_lights(lights: Sequence[Light]) -> Records:
-    """`Light` records (shaders/include/lights.glsl), in the scene's order."""
+    """Return `Light` records (shaders/include/lights.glsl), in the scene's order."""
     table = np.zeros(len(lights), LIGHT)
     if not lights:
         return table
@@ -306,20 +305,20 @@ def pack_lights(lights: Sequence[Light]) -> Records:
 
 
 def reversed_projection(view: ViewMatrices) -> Matrix:
-    """A view's projection as the GPU has it: z in 0…w, 0 at the far plane or at infinity and w at the near one.
+    """Return a view's projection with reversed z: 0 at the far plane or infinity, and w at the near plane.
 
-    Float32 has as many steps between 0 and a thousandth as between a thousandth and 1. Perspective crowds what is far
-    together just where they are (Lapidous and Jiao, "Optimal Depth Buffer for Low-Cost Graphics Hardware", 1999).
+    Perspective compresses distant depths near 0, where float32 is most precise (Lapidous and Jiao, "Optimal Depth
+    Buffer for Low-Cost Graphics Hardware", 1999).
     """
     matrix = view.projection.copy()
     matrix[2] = (matrix[3] - matrix[2]) / 2
-    if math.isinf(view.far):  # the classical one stays a little inside, or rounding would cut at infinity
+    if math.isinf(view.far):  # a standard projection needs a margin, or rounding would clip at infinity
         matrix[2] -= matrix[3] * (matrix[2, 2] / matrix[3, 2])
     return matrix
 
 
 def pack_environment(environment: Environment | None) -> Records:
-    """The `environment_block` (shaders/include/environment.glsl): its turn, a factor, and its projection."""
+    """Return the `environment_block` (shaders/include/environment.glsl): rotation, factor and projection."""
     turn, intensity = (environment.rotate, environment.intensity) if environment is not None else (0.0, 1.0)
     record = np.zeros(1, ENVIRONMENT)
     record["environment_transform"] = (np.cos(turn), np.sin(turn), intensity, 0.0)
@@ -328,7 +327,7 @@ def pack_environment(environment: Environment | None) -> Records:
 
 
 def pack_view(view: ViewMatrices) -> bytes:
-    """A `View` block (shaders/include/view.glsl), 448 bytes; all of it is computed in float64."""
+    """Return a `View` block (shaders/include/view.glsl), 448 bytes, computed in float64."""
     record = np.zeros((), VIEW)
     projection = reversed_projection(view)
     inverse_view, inverse_projection = np.linalg.inv(view.view), np.linalg.inv(projection)
@@ -340,8 +339,8 @@ def pack_view(view: ViewMatrices) -> bytes:
         ("inverse_projection", inverse_projection),
         ("inverse_view_projection", inverse_view @ inverse_projection),
     ):
-        record[name] = matrix.T  # columns behind each other
-    # Lines of sight meet where x, y and w are 0: in a point, or in a direction where they are parallel.
+        record[name] = matrix.T  # column-major
+    # View rays meet where x, y and w are 0: at a point, or in a direction if they are parallel.
     center = inverse_view @ inverse_projection[:, 2]
     length = float(np.linalg.norm(center[:3]))
     parallel = abs(center[3]) * _FARTHEST_EYE < length

@@ -1,8 +1,8 @@
-"""Triangles in an order that a vertex cache likes, vertices in the order of first use.
+"""Order triangles for the vertex cache, and vertices by first use.
 
-Vertices are ranked by connected part and then along a Morton curve; triangles follow by their lowest-ranked vertex, so
-that neighbours on the surface are neighbours in the list. It is a few vectorised sorts, where the usual greedy
-optimisers walk triangle by triangle. A list that is already better stays as it is.
+Vertices are ranked by connected component and then along a Morton curve; triangles are sorted by their lowest-ranked
+vertex, so that neighbours on the surface are neighbours in the list. This takes a few vectorised sorts, where the usual
+greedy optimisers process one triangle at a time. A list that is already better stays unchanged.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from rendergraph.scene.model import Floats, extremes
 
 Indices = npt.NDArray[np.uint32]
 _BATCH = 32  # triangles whose vertices a GPU typically shades together
-_SAMPLED = 4096  # batches that are enough to compare two orders
+_SAMPLED = 4096  # number of batches that suffices to compare two orders
 
 
 def ordered(positions: Floats, triangles: Indices) -> Indices:
-    """The triangles, sorted where that lowers the number of vertices shaded."""
+    """Return the triangles, sorted if that lowers the number of shaded vertices."""
     if len(triangles) <= _BATCH:
         return triangles
-    rank = np.empty(len(positions), np.min_scalar_type(len(positions)))  # 16 bits are sorted without comparing
+    rank = np.empty(len(positions), np.min_scalar_type(len(positions)))  # NumPy uses a radix sort for 16 bits
     key = (parts(triangles, len(positions)).astype(np.uint64) << np.uint64(30)) | morton(positions)
     rank[np.argsort(key, kind="stable")] = np.arange(len(positions), dtype=rank.dtype)
     lowest = np.minimum(np.minimum(rank[triangles[:, 0]], rank[triangles[:, 1]]), rank[triangles[:, 2]])
@@ -30,10 +30,10 @@ def ordered(positions: Floats, triangles: Indices) -> Indices:
 
 
 def first_use(triangles: Indices, count: int) -> tuple[npt.NDArray[np.int64], Indices]:
-    """Renumber vertices in the order of first use, without unused ones: their old numbers, and the new triangles."""
+    """Renumber used vertices by first use; return their old numbers and the new triangles."""
     corners = triangles.reshape(-1)
     first = np.full(count, -1, np.int64)
-    first[corners[::-1]] = np.arange(len(corners) - 1, -1, -1)  # of equal targets the last assignment stays
+    first[corners[::-1]] = np.arange(len(corners) - 1, -1, -1)  # the last assignment to an element wins
     used = np.flatnonzero(first >= 0)
     old = used[np.argsort(first[used])]
     new = np.empty(count, np.uint32)
@@ -42,9 +42,9 @@ def first_use(triangles: Indices, count: int) -> tuple[npt.NDArray[np.int64], In
 
 
 def batch_acmr(triangles: Indices) -> float:
-    """Distinct vertices for each triangle, in batches of 32: what a GPU that shades in batches transforms.
+    """Return the number of distinct vertices per triangle, in batches of 32, as a GPU that shades in batches needs.
 
-    0.5 is the least for large closed meshes, 3 the most. Long lists are sampled evenly.
+    The minimum is 0.5 for large closed meshes, the maximum 3. Long lists are sampled evenly.
     """
     batches = len(triangles) // _BATCH
     if not batches:
@@ -55,11 +55,11 @@ def batch_acmr(triangles: Indices) -> float:
 
 
 def morton(points: Floats) -> npt.NDArray[np.uint64]:
-    """30-bit Morton code of each point within the box of all."""
+    """Return the 30-bit Morton code of each point within the box of all points."""
     low, high = extremes(points)
     with np.errstate(over="ignore"):
         extent = max(float((high - low).max()), 1e-30)
-    if not np.isfinite(extent):  # a box beyond single precision has no curve
+    if not np.isfinite(extent):  # the box exceeds single precision
         return np.zeros(len(points), np.uint64)
     code = np.zeros(len(points), np.uint32)
     for axis in range(3):
@@ -71,9 +71,9 @@ def morton(points: Floats) -> npt.NDArray[np.uint64]:
 
 
 def parts(triangles: Indices, count: int) -> npt.NDArray[np.int64]:
-    """A number for each vertex, the same for all that triangles connect.
+    """Return a number for each vertex that is equal within a connected component.
 
-    Roots hook on to a lower neighbouring root and trees are flattened by pointer jumping, until no edge joins two.
+    Roots hook onto a lower neighbouring root and trees are flattened by pointer jumping, until no edge joins two trees.
     """
     label = np.arange(count)
     a = np.concatenate([triangles[:, 0], triangles[:, 1]]).astype(np.int64)

@@ -1,4 +1,4 @@
-"""The empirical models' coefficients from metallic-roughness and back (design.md §8).
+"""Convert between coefficients of the empirical models and metallic-roughness (design.md §8).
 
 `kd = base (1 - metallic)`, `ks = f0`, `4n = 2/α² - 2` with `α = roughness²`; the ambient coefficient is the albedo.
 """
@@ -13,12 +13,12 @@ _LEAST_ALPHA = 1e-3
 
 
 def dielectric_f0(ior: float) -> float:
-    """Reflectance at normal incidence from an index of refraction, `((ior-1)/(ior+1))²`; 0 stands for infinity."""
+    """Return the reflectance at normal incidence, `((ior-1)/(ior+1))²`; an ior of 0 stands for infinity."""
     return 1.0 if ior == 0 else ((ior - 1) / (ior + 1)) ** 2
 
 
 def f0_of(material: Material) -> Vec3:
-    """Specular reflectance at normal incidence, dielectric and metal mixed."""
+    """Return the specular reflectance at normal incidence, a mix of dielectric and metal."""
     f0, metallic = dielectric_f0(material.ior), material.metallic
     r, g, b = (
         min(f0 * tint, 1.0) * material.specular * (1 - metallic) + base * metallic
@@ -37,7 +37,7 @@ def roughness_of(shininess: float) -> float:
 
 
 def phong_of(material: Material) -> tuple[Vec3, Vec3, Vec3, float]:
-    """Ambient, diffuse and specular coefficient and the exponent n: the material's own, or derived ones."""
+    """Return ambient, diffuse and specular coefficient and the exponent n: the material's own, or derived ones."""
     r, g, b, _ = material.base_color
     keep = 1 - material.metallic
     diffuse = material.diffuse or (r * keep, g * keep, b * keep)

@@ -1,6 +1,6 @@
-"""One scene or mesh file being read: where its paths may lead, what it may contain, and the warnings so far.
+"""The state of reading one scene or mesh file: its root rule, limits and warnings.
 
-Scene files are untrusted data. A path found in one is resolved, links followed, and checked against the root rule
+Scene files are untrusted data. A path in one is resolved, including symbolic links, and checked against the root rule
 before anything is opened; only regular files are read, and only up to a limit.
 """
 
@@ -30,12 +30,12 @@ CheckPath: TypeAlias = Callable[[Path, Place | None], Path]
 
 _MOST_WARNINGS = 50
 _UNAVAILABLE = ("RG011", "RG301")
-"""Codes of the root rule for a path that leads nowhere."""
+"""Codes of the root rule for a path that does not exist."""
 _NOT_A_FILE = {"missing": "does not exist", "other": "is not a regular file", "unreadable": "cannot be read"}
 
 
 def inside(folder: Path) -> CheckPath:
-    """Return the root rule that keeps everything under one folder, links followed."""
+    """Return the root rule that keeps everything under one folder, with symbolic links resolved."""
 
     def check(path: Path, place: Place | None) -> Path:
         root, resolved = folder.resolve(), path.resolve()
@@ -48,7 +48,7 @@ def inside(folder: Path) -> CheckPath:
 
 
 def printable(text: str) -> str:
-    """A name from a file with a replacement character for each character that cannot be printed."""
+    """Return a file's name with a replacement character for each unprintable character."""
     return "".join(c if c.isprintable() else "\ufffd" for c in text)
 
 
@@ -60,7 +60,7 @@ class UniqueNames:
         self._next: dict[str, int] = {}
 
     def unique(self, name: str, fallback: str) -> str:
-        """`name`, or `fallback` if it is empty, with a number if it is taken."""
+        """Return `name`, or `fallback` if it is empty, with a number if it is taken."""
         base = printable(name) or fallback
         name, number = base, self._next.get(base, 1)
         while name in self._taken:
@@ -72,7 +72,7 @@ class UniqueNames:
 
 
 class Reading(Struct):
-    """One file being read. `file` in its methods is another file on whose behalf it is read, such as an MTL's."""
+    """One file being read. Its methods take as `file` another file read on its behalf, such as an MTL."""
 
     path: Path
     check_path: CheckPath
@@ -83,7 +83,7 @@ class Reading(Struct):
 
     @property
     def warnings(self) -> tuple[Problem, ...]:
-        """What was left out, replaced or clamped, in the order of discovery."""
+        """Warnings about what was left out, replaced or clamped, in the order of discovery."""
         return tuple(self._warnings.values())
 
     def warn(self, code: str, kind: str, text: str, *, line: int = 0, file: Path | None = None) -> None:
@@ -98,10 +98,10 @@ class Reading(Struct):
             self._warnings.setdefault((problem.code, problem.text, str(problem.place)), problem)
 
     def warn_unmapped(self, name: str, material: Material, mesh: Mesh) -> None:
-        """Warn if a material has textures, and the mesh no coordinates for them."""
+        """Warn if a material has textures but the mesh has no coordinates for them."""
         for slot, texture in material.textures.items():
             if (mesh.uv1 if texture.uv else mesh.uv0) is None:
-                text = f"'{shown(name)}' has no coordinates for its {slot} texture, whose first texel is everywhere"
+                text = f"'{shown(name)}' has no coordinates for its {slot} texture; its first texel is used everywhere"
                 self.warn("RG333", "unmapped", text)
 
     def error(self, code: str, text: str, *, line: int = 0, file: Path | None = None) -> InputError:
@@ -114,7 +114,7 @@ class Reading(Struct):
         return Place(str(file or self.path), line, 1 if line else 0)
 
     def _name(self, path: Path) -> str:
-        """A path for messages: relative to this file's folder if it lies below."""
+        """Return a path for messages, relative to this file's folder if it lies below."""
         folder = self.path.parent.resolve()
         return shown(str(path.relative_to(folder) if path != self.path and path.is_relative_to(folder) else path))
 
@@ -130,7 +130,7 @@ class Reading(Struct):
             raise self.error("RG301", text, line=line, file=file) from None
 
     def find(self, name: str, *, line: int = 0, file: Path | None = None) -> Path | None:
-        """`resolve` for a file that may be missing: None if there is none."""
+        """Resolve a name of a file that may be missing; None if it is."""
         try:
             path = self.resolve(name, line=line, file=file)
         except InputError as error:
@@ -184,7 +184,7 @@ class Reading(Struct):
         return self._checked(ImageSource(self.path, data, f"{what} in {shown(self.path.name)}"), what, 0)
 
     def _checked(self, source: ImageSource, what: str, line: int) -> ImageSource:
-        from rendergraph.scene.image_files import ImageError, read_header  # for scenes with images alone
+        from rendergraph.scene.image_files import ImageError, read_header  # only for scenes with images
 
         try:
             size, channels = read_header(source, self.limits)
@@ -200,7 +200,7 @@ def _read_npy(data: bytes) -> npt.NDArray[Any]:
 
 
 def file_kind(path: Path) -> Literal["file", "missing", "other", "unreadable"]:
-    """Return what is at a path, links followed."""
+    """Return what is at a path, with symbolic links resolved."""
     record_read(path)
     try:
         mode = path.stat().st_mode
@@ -212,5 +212,5 @@ def file_kind(path: Path) -> Literal["file", "missing", "other", "unreadable"]:
 
 
 def _reason(problem: Exception) -> str:
-    """The operating system's text without path and number."""
+    """Return the operating system's text without path and number."""
     return getattr(problem, "strerror", None) or shown(str(problem))

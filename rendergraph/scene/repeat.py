@@ -1,4 +1,4 @@
-"""Copies of an object or light: where they are, and what tells them apart (`repeat:` of a scene file)."""
+"""Copies of an object or light: their positions and differences (`repeat:` of a scene file)."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ COLUMNS = {
     "objects": {"at": 3, "rotate_degrees": 3, "scale": 1},
     "lights": {"at": 3, "color": 3, "intensity": 1, "range": 1},
 }
-"""What a file of copies may give for each copy, by section, with the count of its numbers."""
+"""The values that a file of copies may give for each copy, by section, with their numbers of components."""
 _CSV = {
     **{axis: ("at", number) for number, axis in enumerate("xyz")},
     **{channel: ("color", number) for number, channel in enumerate("rgb")},
     **{f"rotate_{axis}": ("rotate_degrees", number) for number, axis in enumerate("xyz")},
     **{name: (name, 0) for name in ("scale", "intensity", "range")},
 }
-"""The columns of a table in text, with the key and the number within it."""
+"""The columns of a text table, with their key and component."""
 _RANDOM = ("at", "rotate_degrees", "scale", "color", "intensity", "choose")
-"""What is varied. Each has random numbers of its own, so that one more does not change the others."""
+"""The properties that vary. Each has its own random numbers, so that varying another one does not change them."""
 
 
 class Copies(Struct, frozen=True, eq=False):
@@ -39,9 +39,9 @@ class Copies(Struct, frozen=True, eq=False):
 
     Attributes:
         offsets: metres from the entry's position, (n, 3).
-        turns: applied after the entry's own rotation and scale, about its position, (n, 3, 3); None for none.
-        values: by key, what a copy has in place of the entry's value.
-        factors: by key, what the entry's value is multiplied by, (n, 1) or (n, 3).
+        turns: rotations about the entry's position after its own rotation and scale, (n, 3, 3); None for none.
+        values: by key, a copy's replacement for the entry's value.
+        factors: by key, factors on the entry's value, (n, 1) or (n, 3).
     """
 
     offsets: Doubles
@@ -76,7 +76,7 @@ class Copies(Struct, frozen=True, eq=False):
 
 
 def count_of(values: Mapping[str, Any]) -> int:
-    """Return the number of copies that `repeat` asks for; 0 for a file, which has not been read."""
+    """Return the number of copies that `repeat` requests; 0 for a file, which has not been read."""
     if "grid" in values:
         return math.prod(values["grid"])
     return int(next((values[key] for key in ("line", "ring", "scatter") if key in values), 0))
@@ -87,7 +87,7 @@ def copies(values: Mapping[str, Any], columns: Mapping[str, Doubles]) -> Copies:
 
     Args:
         values: the keys of `repeat`.
-        columns: of its file, by key, (n, 1) or (n, 3); see `read_columns`.
+        columns: the columns of its file by key, (n, 1) or (n, 3); see `read_columns`.
 
     Raises:
         ValueError: keys contradict each other.
@@ -118,7 +118,7 @@ def copies(values: Mapping[str, Any], columns: Mapping[str, Doubles]) -> Copies:
 
 
 def _layout(values: Mapping[str, Any], columns: Mapping[str, Doubles]) -> tuple[Doubles, Doubles]:
-    """Offsets (n, 3) and turns (n, 3, 3) without random changes."""
+    """Return offsets (n, 3) and rotations (n, 3, 3) without random changes."""
     if "grid" in values:
         nx, ny, nz = values["grid"]
         number = np.arange(nx * ny * nz)
@@ -150,7 +150,7 @@ def _identities(count: int) -> Doubles:
 
 
 def _rotations(degrees: Doubles) -> Doubles:
-    """`geometry.euler_matrix` of each row, (n, 3, 3)."""
+    """Return `geometry.euler_matrix` of each row, (n, 3, 3)."""
     (cx, cy, cz), (sx, sy, sz) = np.cos(np.radians(degrees.T)), np.sin(np.radians(degrees.T))
     rows = [
         [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
@@ -165,7 +165,7 @@ def _tuples(array: Doubles) -> list[Any]:
 
 
 def _random(seed: int, key: str, shape: tuple[int, ...], *, purpose: int = 0, signed: bool = False) -> Doubles:
-    """Random numbers from 0 to 1, or -1 to 1; from raw bits, which are the same with every version of NumPy."""
+    """Return random numbers from 0 to 1, or -1 to 1, from raw bits, which are the same in every NumPy version."""
     from numpy.random import PCG64  # few scenes need it
 
     bits = PCG64([seed, _RANDOM.index(key), purpose]).random_raw(math.prod(shape))
@@ -177,16 +177,16 @@ def _random(seed: int, key: str, shape: tuple[int, ...], *, purpose: int = 0, si
 
 
 def read_columns(data: bytes, ending: str, section: str, most: int, most_bytes: int) -> dict[str, Doubles]:
-    """Return what a file says of each copy: by key of `COLUMNS`, finite numbers (n, 1) or (n, 3).
+    """Return a file's values for each copy: by key of `COLUMNS`, finite numbers (n, 1) or (n, 3).
 
     Args:
         ending: `.csv`: a header and a row for each copy; `.npz`: an array for each key; `.json`: a mapping of those.
         section: `objects` or `lights`.
         most: limit of copies.
-        most_bytes: limit of what a compressed file unpacks to.
+        most_bytes: limit of the unpacked size of a compressed file.
 
     Raises:
-        ValueError: the file is broken, or has something else in it.
+        ValueError: the file is broken, or is not a table of copies.
     """
     if ending == ".csv":
         given = _csv_columns(data, section, most)
@@ -198,7 +198,7 @@ def read_columns(data: bytes, ending: str, section: str, most: int, most_bytes: 
     elif ending == ".npz":
         given = read_arrays(data, most_bytes)
     else:
-        raise ValueError("is no table of copies; use a file that ends in .csv, .json or .npz")
+        raise ValueError("is not a table of copies; use a file that ends in .csv, .json or .npz")
     known = COLUMNS[section]
     found = {}
     for key, values in given.items():
@@ -232,7 +232,7 @@ def _column(key: str, values: object, width: int) -> Doubles:
 
 
 def _csv_columns(data: bytes, section: str, most: int) -> dict[str, Any]:
-    import csv  # for such files alone
+    import csv  # only for such files
 
     columns = {name: target for name, target in _CSV.items() if target[0] in COLUMNS[section]}
     numbers: list[list[float]] = []
@@ -241,7 +241,7 @@ def _csv_columns(data: bytes, section: str, most: int) -> dict[str, Any]:
         header = [name.strip() for name in next(rows, [])]
         if wrong := [name for name in header if name not in columns or header.count(name) > 1]:
             hint = suggestion(wrong[0], columns, most=len(columns))
-            raise ValueError(f"'{wrong[0]}' is no column, or there twice{hint}")
+            raise ValueError(f"'{wrong[0]}' is not a column, or occurs twice{hint}")
         for row in filter(None, rows):
             if len(row) != len(header) or len(numbers) >= most:
                 raise ValueError(
@@ -260,8 +260,8 @@ def _csv_columns(data: bytes, section: str, most: int) -> dict[str, Any]:
 
 
 def read_arrays(data: bytes, most_bytes: int) -> dict[str, Any]:
-    """Return the arrays of an `.npz` file that unpacks to at most so many bytes; a mistake is a ValueError."""
-    import zipfile  # for such files alone
+    """Return the arrays of an `.npz` file that unpacks to at most `most_bytes`; raise ValueError for a mistake."""
+    import zipfile  # only for such files
     import zlib  # as zipfile
 
     broken = (ValueError, OSError, EOFError, KeyError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)

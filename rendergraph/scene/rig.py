@@ -18,7 +18,7 @@ Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
 
 _BOX_SLACK = 1e-5
-"""Of the sizes of the terms that a posed vertex is summed from: more than single precision loses in them."""
+"""Rounding margin of a posed vertex, relative to the sizes of its summed terms."""
 
 
 class Deform(Struct, frozen=True, eq=False, dict=True):
@@ -26,7 +26,7 @@ class Deform(Struct, frozen=True, eq=False, dict=True):
 
     Attributes:
         rest: `positions`, `normals` and perhaps `tangents` of the mesh in its bind pose, float32 (n, 3 or 4).
-        targets: by stream the displacements of t targets, float32 (t, n, 3); positions always.
+        targets: by stream, the displacements of t targets, float32 (t, n, 3); always for positions.
         joints: int32 (n, k), the joints of each vertex, k = 0 without a skin.
         weights: float32 (n, k), not negative, with a sum of 1.
     """
@@ -37,14 +37,14 @@ class Deform(Struct, frozen=True, eq=False, dict=True):
     weights: Floats
 
     def at(self, vertices: npt.NDArray[np.integer]) -> Deform:
-        """Return the same for some of the vertices, in another order."""
+        """Return the same for a subset or reordering of the vertices."""
         rest = {name: stream[vertices] for name, stream in self.rest.items()}
         targets = {name: deltas[:, vertices] for name, deltas in self.targets.items()}
         return Deform(rest, targets, self.joints[vertices], self.weights[vertices])
 
     @cached_property
     def _boxes(self) -> tuple[Ints, Doubles, Doubles, Doubles, Doubles]:
-        """Joints that move some vertex, (u,), the box of what each moves, and what each target adds, (u or t, 3)."""
+        """Joints that move any vertex, (u,), the boxes of their vertices, and the extents of targets, (u or t, 3)."""
         positions, joints, weights = self.rest["positions"].astype(np.float64), self.joints, self.weights
         if not joints.shape[1]:
             joints, weights = np.zeros((len(positions), 1), np.int32), np.ones((len(positions), 1), np.float32)
@@ -57,7 +57,7 @@ class Deform(Struct, frozen=True, eq=False, dict=True):
         return used, low[used], high[used], deltas.min(axis=1).astype(float), deltas.max(axis=1).astype(float)
 
     def pose(self, joints: Doubles, weights: Doubles) -> Pose:
-        """Return a pose with its box. A vertex is a mean of where each joint has it, so it lies in their hull."""
+        """Return a pose with its box: a vertex is a mean of its positions under all joints, so within their hull."""
         used, low, high, least, most = self._boxes
         center = (low + high) / 2 + weights @ ((least + most) / 2)
         extent = (high - low) / 2 + np.abs(weights) @ ((most - least) / 2)
@@ -72,13 +72,13 @@ class Deform(Struct, frozen=True, eq=False, dict=True):
 
 
 class Pose(Struct, frozen=True, eq=False, dict=True):
-    """What moves the vertices of one mesh at a moment; all objects of the mesh have the same.
+    """The pose of one mesh at a moment, shared by all objects of the mesh.
 
     Attributes:
-        joints: float64 (j, 3, 4), from the mesh to the object: a joint's transform times the inverse of its bind pose;
-            j = 0 without a skin.
-        weights: float64 (t,), of the morph targets.
-        box: least and greatest corner, which contain all posed vertices.
+        joints: float64 (j, 3, 4), mesh to object: a joint's transform times the inverse of its bind pose; j = 0
+            without a skin.
+        weights: float64 (t,), weights of the morph targets.
+        box: minimum and maximum corner around all posed vertices.
     """
 
     deform: Deform
@@ -88,11 +88,11 @@ class Pose(Struct, frozen=True, eq=False, dict=True):
 
     @cached_property
     def values(self) -> bytes:
-        """Joints and weights as the GPU has them; what is equal draws the same."""
+        """Joints and weights in the GPU's layout; equal values render the same."""
         return np.concatenate([self.joints.reshape(-1), self.weights]).astype(np.float32).tobytes()
 
     def vertices(self) -> dict[str, Floats]:
-        """Return the posed streams of `Deform.rest`, worked out in float64."""
+        """Return the posed streams of `Deform.rest`, computed in float64."""
         found = {name: stream.astype(np.float64) for name, stream in self.deform.rest.items()}
         for name, deltas in self.deform.targets.items():
             found[name][:, :3] += np.tensordot(self.weights, deltas.astype(np.float64), 1)
@@ -100,7 +100,7 @@ class Pose(Struct, frozen=True, eq=False, dict=True):
             weights = self.deform.weights.astype(np.float64)
             blended = np.einsum("nk,nkij->nij", weights, self.joints[self.deform.joints])
             linear = blended[:, :, :3]
-            rows = [np.cross(linear[:, i - 2], linear[:, i - 1]) for i in range(3)]  # of the cofactor matrix
+            rows = [np.cross(linear[:, i - 2], linear[:, i - 1]) for i in range(3)]  # rows of the cofactor matrix
             sign = np.sign((linear[:, 0] * rows[0]).sum(axis=1))
             found["normals"] = np.stack([(row * found["normals"]).sum(axis=1) * sign for row in rows], axis=1)
             for name in ("positions", "tangents") & found.keys():
@@ -121,7 +121,7 @@ class Track(Struct, frozen=True, eq=False):
         nodes: (c,).
         times: float64 (k,), seconds, increasing.
         values: float64 (k, c, w); rotations are unit quaternions x, y, z, w.
-        slopes: of cubic splines, float64 (2, k, c, w), arriving and leaving.
+        slopes: in- and out-tangents of cubic splines, float64 (2, k, c, w).
     """
 
     path: Literal["translation", "rotation", "scale", "weights"]
@@ -149,7 +149,7 @@ class Track(Struct, frozen=True, eq=False):
 
 
 def slerp(a: Doubles, b: Doubles, t: float) -> Doubles:
-    """Return unit quaternions (c, 4) between others, along the shorter arc (Shoemake 1985)."""
+    """Interpolate unit quaternions (c, 4) along the shorter arc (Shoemake 1985)."""
     cosine = (a * b).sum(axis=1, keepdims=True)
     b, cosine = np.where(cosine < 0, -b, b), np.minimum(np.abs(cosine), 1.0)
     angle = np.arccos(cosine)
@@ -169,7 +169,7 @@ class Clip(Struct, frozen=True):
 
 
 class Part(Struct, frozen=True, eq=False):
-    """An object of a file: its node, its transform inside that, (4, 4), and the skin that moves it instead, or -1."""
+    """An object of a file: its node, its transform in the node, (4, 4), and the skin that moves it instead, or -1."""
 
     node: int
     local: Doubles
@@ -184,16 +184,16 @@ class Skin(Struct, frozen=True, eq=False):
 
 
 class Rig(Struct, frozen=True, eq=False, dict=True):
-    """The n nodes of a file, what hangs on them, and how they move.
+    """The n nodes of a file, their objects, lights and cameras, and their animation.
 
     Attributes:
         parents: (n,), -1 for roots.
         rest: `translation`, `rotation` and `scale` of the nodes at rest, (n, 3), (n, 4) and (n, 3).
-        matrices: by node its transform where it is given as a matrix, which nothing animates.
-        weights: by node those of its morph targets at rest.
-        objects, lights, cameras: what the file's placements consist of, in their order: parts, nodes and nodes.
-        placements: in `Scene.placements`, with their transforms, (4, 4); more than one where a file is repeated.
-        clip: what is played over and over, from its second `start` on; None for the rest pose.
+        matrices: by node, its transform if it is given as a matrix, which cannot be animated.
+        weights: by node, the weights of its morph targets at rest.
+        objects, lights, cameras: the contents of the file's placements, in their order: parts, nodes and nodes.
+        placements: entries of `Scene.placements` with their transforms, (4, 4); several if a file is repeated.
+        clip: the clip that is looped, from its second `start` on; None for the rest pose.
     """
 
     parents: Ints
@@ -212,13 +212,13 @@ class Rig(Struct, frozen=True, eq=False, dict=True):
 
     @property
     def length(self) -> float:
-        """Seconds until it repeats; 0 where nothing moves."""
+        """Seconds until the animation repeats; 0 if nothing moves."""
         return self.clip.length / abs(self.speed) if self.clip is not None and self.speed else 0.0
 
     def at(self, time: float) -> tuple[Doubles, list[tuple[Doubles, Doubles, Doubles]]]:
         """Return the transforms of all nodes to the file's space, (n, 4, 4), and the state of each object.
 
-        That is its transform in the file, those of its joints, (j, 3, 4), and the weights of its targets, (t,).
+        The state is its transform in the file, those of its joints, (j, 3, 4), and the weights of its targets, (t,).
         """
         streams, weights = {name: values.copy() for name, values in self.rest.items()}, dict(self.weights)
         moment = self.start + self.speed * time
@@ -235,7 +235,7 @@ class Rig(Struct, frozen=True, eq=False, dict=True):
         with np.errstate(over="ignore", invalid="ignore"):
             for level in self._levels:
                 worlds[level] = worlds[self.parents[level]] @ worlds[level]
-        # Of an object without a skin -1 finds the last entry: no joints.
+        # For an object without a skin, -1 selects the last entry: no joints.
         skins = [*((worlds[skin.joints] @ skin.inverse_binds)[:, :3] for skin in self.skins), np.zeros((0, 3, 4))]
         at = [one.local if one.skin >= 0 else worlds[one.node] @ one.local for one in self.objects]
         nodes = ((skins[one.skin], weights.get(one.node, np.zeros(0))) for one in self.objects)
@@ -243,7 +243,7 @@ class Rig(Struct, frozen=True, eq=False, dict=True):
 
     @cached_property
     def _levels(self) -> list[npt.NDArray[np.int64]]:
-        """The nodes below roots, those below them, and so on."""
+        """The nodes by depth in the hierarchy, starting with the children of roots."""
         found, nodes = [], np.flatnonzero(self.parents < 0)
         while len(nodes := np.flatnonzero(np.isin(self.parents, nodes) & (self.parents >= 0))):
             found.append(nodes)
@@ -251,7 +251,7 @@ class Rig(Struct, frozen=True, eq=False, dict=True):
 
 
 def placements(translations: Doubles, rotations: Doubles, scales: Doubles) -> Doubles:
-    """Return `T·R·S` as (n, 4, 4) of translations (n, 3), quaternions x, y, z, w (n, 4) and scales (n, 3)."""
+    """Return `T·R·S` as (n, 4, 4) from translations (n, 3), quaternions x, y, z, w (n, 4) and scales (n, 3)."""
     x, y, z, w = rotations.T / np.array([math.hypot(*rotation) or 1.0 for rotation in rotations.tolist()])
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],

@@ -1,7 +1,7 @@
-"""A scene as data for shaders: the buffers behind inputs of `SceneData`, in the layouts of `scene.glsl`. No GL.
+"""The buffers behind inputs of `SceneData`, in the layouts of `scene.glsl`. No GL.
 
 An instance is an object of the scene, with the same number. Triangles are numbered within their mesh, in the order of
-the packed indices, which is that of `gl_PrimitiveID` in a geometry pass.
+the packed indices, as in `gl_PrimitiveID` of a geometry pass.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ INSTANCE_DATA = np.dtype(
     + [(name, "<i4") for name in ("material", "mesh", "flags", "first_index", "base_vertex", "triangles")]
     + [("first_emitter", "<i4"), ("padding", "<i4"), ("box_center", "<f4", 4), ("box_extent", "<f4", 4)]
 )
-"""`SceneInstance`: rows of the affine object-to-world matrix, indices, flags, where its geometry lies, and its box."""
+"""`SceneInstance`: rows of the affine object-to-world matrix, indices, flags, location of the geometry, and box."""
 EMITTER = np.dtype([("instance", "<i4"), ("triangle", "<i4")])
 
 _OPTIONAL = {"tangents": 4, "uv0": 2, "uv1": 2, "colors": 4}
-"""Vertex streams that a scene may lack, behind positions and normals, with their widths."""
+"""Optional vertex streams, which follow positions and normals, with their widths."""
 
 MOST_ARRAYS = 5
-"""Texture arrays of a scene; with the other textures of a step they must fit into the 16 units of a stage."""
+"""Maximum number of texture arrays of a scene, so that they fit into a stage's 16 units with a step's textures."""
 BORDER = 1
-"""Texels around an image in its layer, which repeat it as its wrap modes say, so that filtering finds them there."""
+"""Texels of border around an image in its layer, which continue it by its wrap modes, for filtering."""
 _WRAPS = ("repeat", "mirror", "clamp")
 _LIGHT_FILES = (".hdr", ".exr")
 
@@ -51,10 +51,10 @@ Stored: TypeAlias = tuple[ImageSource, bool, str, str]
 
 
 class TextureArrays(NamedTuple):
-    """The arrays that hold a scene's textures, array and layer of each, and how many are smaller than their layer.
+    """The arrays for a scene's textures, the array and layer of each, and the number smaller than their layer.
 
-    Textures of one format and size share an array. Where that makes more than `MOST_ARRAYS`, arrays of one format are
-    joined, those first for which that takes the fewest bytes: a smaller image then fills a corner of its layer.
+    Textures with the same format and size share an array. If that gives more than `MOST_ARRAYS`, arrays of the same
+    format are merged, those first that add the fewest bytes: a smaller image then fills a corner of its layer.
     """
 
     arrays: tuple[TextureDesc, ...]
@@ -67,15 +67,15 @@ def stored(texture: Texture) -> Stored:
 
 
 def used_textures(scene: Scene) -> dict[Stored, Texture]:
-    """Return what arrays hold: every texture of a material that some object has."""
+    """Return the textures in the arrays: those of all materials that objects use."""
     used = sorted({placed.material for placed in scene.objects})
     return {stored(texture): texture for number in used for texture in scene.materials[number].textures.values()}
 
 
 def expected_arrays(scene: Scene) -> TextureArrays:
-    """Return the arrays as far as files say what is in them, before anything is decoded.
+    """Return the arrays that file headers suggest, before anything is decoded.
 
-    Images of more than 8 bits a channel that are no HDR or EXR files, and those of plugins, may turn out otherwise.
+    Images with more than 8 bits per channel that are not HDR or EXR files, and those of plugins, may differ.
     """
     descs = {}
     for key, texture in used_textures(scene).items():
@@ -105,7 +105,7 @@ def texture_arrays(descs: Mapping[Stored, TextureDesc]) -> TextureArrays:
 
 
 def _added_bytes(pair: Sequence[tuple[str, int, int]], groups: Mapping[tuple[str, int, int], list[Stored]]) -> int:
-    """Return the bytes by which images take more room when two groups become one."""
+    """Return the additional bytes if two groups are merged."""
     (name, a, b), (_, c, d) = pair
     one, other = (len(groups[each]) for each in pair)
     return FORMATS[name].bytes * (max(a, c) * max(b, d) * (one + other) - a * b * one - c * d * other)
@@ -115,7 +115,7 @@ def texture_data(scene: Scene, sizes: Mapping[Stored, tuple[int, int]], arrays: 
     """Return int32 (m, 8, 4) for the slots of each material.
 
     They are array (-1 without a texture), layer, `width | height << 16`, and bits: UV set, 2 for an unfiltered
-    texture, and from the third and fifth bit on the wrap mode along s and t, 0 to 2 for repeat, mirror and clamp.
+    texture, and from the third and fifth bit on the wrap modes along s and t: 0 repeat, 1 mirror, 2 clamp.
     """
     table = np.full((len(scene.materials), slot_count(scene.materials), 4), (-1, 0, 0, 0), np.int32)
     for number, material in enumerate(scene.materials):
@@ -130,7 +130,7 @@ def texture_data(scene: Scene, sizes: Mapping[Stored, tuple[int, int]], arrays: 
 
 
 def scene_data_facts(scene: Scene, rays: bool = False) -> SceneDataFacts:
-    """Return what inputs of `SceneData` bring along in this scene, some of them with `rays`."""
+    """Return facts about inputs of `SceneData` in this scene, with `rays` if any of them traces."""
     vertices = sum(len(mesh.positions) for mesh in scene.meshes)
     width = _vertex_floats([name for name in _OPTIONAL if any(getattr(m, name) is not None for m in scene.meshes)])
     emitters = sum(len(scene.meshes[scene.objects[number].mesh].indices) for number in emitting_objects(scene))
@@ -152,9 +152,9 @@ def scene_data_facts(scene: Scene, rays: bool = False) -> SceneDataFacts:
 
 
 def posing_figures(scene: Scene) -> dict[str, int]:
-    """Return how many meshes and vertices are posed, and the bytes of that beside the streams that steps read.
+    """Return the numbers of posed meshes and vertices, and their bytes beyond the streams that steps read.
 
-    These are the vertices at rest, and the positions of the frame before if some pass asks for those.
+    The bytes are for the vertices at rest, and for previous positions if a pass reads them.
     """
     deforms = {id(placed.pose): placed.pose.deform for placed in scene.objects if placed.pose is not None}.values()
     arrays = [
@@ -165,7 +165,7 @@ def posing_figures(scene: Scene) -> dict[str, int]:
 
 
 def emitting_objects(scene: Scene) -> list[int]:
-    """Return the objects whose triangles emit light in some frame; hidden ones do not."""
+    """Return the visible objects whose triangles emit light in any frame."""
     emits = [scene.emits(material) for material in scene.materials]
     return [n for n, placed in enumerate(scene.objects) if emits[placed.material] and not placed.hidden]
 
@@ -207,14 +207,14 @@ def data_macros(scene: Scene, packed: PackedScene, arrays: TextureArrays) -> dic
 
 
 def vertex_data(packed: PackedScene) -> npt.NDArray[np.float32]:
-    """Return the vertices, float32 (v, 4 rows): position, normal, and what else some mesh has."""
+    """Return the vertices, float32 (v, 4 rows): position, normal, and further streams that any mesh has."""
     found = [getattr(packed, name) for name in ("positions", "normals", *_OPTIONAL)]
     vertices = np.concatenate([stream for stream in found if stream is not None], axis=1)
     return np.pad(vertices, ((0, 0), (0, -vertices.shape[1] % 4)))
 
 
 def _vertex_floats(streams: Sequence[str]) -> int:
-    """Return how many floats position, normal and these streams have."""
+    """Return the number of floats of position, normal and these streams."""
     return 6 + sum(_OPTIONAL[name] for name in streams)
 
 
@@ -235,7 +235,7 @@ def instance_data(scene: Scene, packed: PackedScene) -> Records:
 
 
 def place_instances(records: Records, scene: Scene, packed: PackedScene, numbers: npt.NDArray[np.int64]) -> None:
-    """Write what depends on where these objects are, and on their material, into their `INSTANCE_DATA` records."""
+    """Write the fields that depend on these objects' transforms and materials into their `INSTANCE_DATA` records."""
     records["rows"][numbers] = packed.instances["rows"][numbers]
     records["material"][numbers] = packed.instances["ids"][numbers, 0]
     records["flags"][numbers] = [_flags(scene, number, packed) for number in numbers]
@@ -254,7 +254,7 @@ def _flags(scene: Scene, number: int, packed: PackedScene) -> int:
         "blended": material.alpha_mode == "blend",
         "mirrored": bool(packed.mirrored[number]),
         "unlit": material.unlit,
-        # As `features` has it for geometry passes: elsewhere tangents follow from texture coordinates.
+        # As in `features` for geometry passes: otherwise tangents are derived from texture coordinates.
         "has_tangents": mesh.tangents is not None and ("normal" in material.textures or scene.has_grain(material)),
         "has_uv0": mesh.uv0 is not None,
         "has_uv1": mesh.uv1 is not None,
@@ -265,7 +265,7 @@ def _flags(scene: Scene, number: int, packed: PackedScene) -> int:
 
 
 def emitter_data(scene: Scene, packed: PackedScene) -> Records:
-    """Return an `EMITTER` record for each triangle that emits light in some frame, those of an object in order."""
+    """Return an `EMITTER` record for each triangle that emits light in any frame, in order within each object."""
     counts = [int(packed.meshes["count"][scene.objects[number].mesh]) // 3 for number in emitting_objects(scene)]
     records = np.zeros(sum(counts), EMITTER)
     records["instance"] = np.repeat(np.array(emitting_objects(scene), np.int32), counts)

@@ -1,6 +1,6 @@
 """Scene files: objects placed from shapes and mesh files, with materials, lights, cameras, keyframes (design.md §5).
 
-All mistakes of a file are found before it stops, each with line, column and the nearest right name.
+All mistakes of a file are gathered, each with line, column and the nearest valid name.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ _SRGB = ("base_color", "emissive", "specular_color", "sheen_color")
 
 
 def read_scene(path: Path | None, reading: Reading, changes: Value | None = None) -> Scene:
-    """Read a scene file with what it extends, and changes; the error has every mistake, or the first of a mesh file."""
+    """Read a scene file, what it extends, and changes; raise all mistakes, but only the first of a mesh file."""
     validator = Validator(scene_keys.CODES)
     root = Value({}, Source("scene")) if path is None else _extended(path, reading, validator, ())
     if changes is not None:
@@ -98,7 +98,7 @@ def _extended(path: Path, reading: Reading, validator: Validator, before: tuple[
 
 
 def _check_names(root: Value, changes: Value, whole: Value, validator: Validator) -> None:
-    """Report settings such as `scene.lights.sn.color` of what the scene has not, and take them out of the whole."""
+    """Report settings such as `scene.lights.sn.color` for entries that do not exist, and remove them."""
     for section in SECTION_NAMES:
         known = _entries(root, section)
         for name, entry in _entries(changes, section).items():
@@ -116,7 +116,7 @@ def _by_place(problem: Problem) -> tuple[bool, str, int, int]:
 
 
 class _File(Struct):
-    """A mesh file already read, with the places of its meshes, its materials and its rig in the scene."""
+    """A mesh file that has been read, with the indices of its meshes, materials and rig in the scene."""
 
     scene: Scene
     first_mesh: int
@@ -151,7 +151,7 @@ class _Reader:
         self.variants: dict[str, dict[int, int]] = {}
 
     def read(self, root: Value) -> Scene:
-        """The scene; only to be used if no problem was found."""
+        """Return the scene, which may be used only if no problem was found."""
         self.names = names = {section: tuple(_entries(root, section)) for section in SECTION_NAMES}
         self._add_plugin_keys(root)
         top = self.validator.file(root, self.table, "`scene: 1` and `objects`")
@@ -186,7 +186,7 @@ class _Reader:
         return animate.following(scene, {}) if scene.follows and not self.validator.problems else scene
 
     def _follows(self, top: Value) -> dict[str, tuple[int, ...]]:
-        """By camera the objects that it follows: a name under `objects`, or that of a copy."""
+        """Return by camera the objects that it follows: a name under `objects`, or that of a copy."""
         found = {}
         for name, entry in _entries(top, "cameras").items():
             self._check_name(entry, "follow", self.placements, "objects")
@@ -196,7 +196,7 @@ class _Reader:
         return found
 
     def _add_plugin_keys(self, root: Value) -> None:
-        """Ask the plugins if the file has keys that are not rendergraph's own."""
+        """Add keys of plugins if the file has keys that are not rendergraph's own."""
         asked = _unknown_keys(root)
         if has_unknown_kinds := not _kinds(root) <= self.kinds.keys():
             self.kinds = {**self.kinds, **self.reading.extensions.textures()}
@@ -213,7 +213,7 @@ class _Reader:
             self.validator.problems += self.reading.extensions.problems
 
     def _plain(self, section: str, entry: Value) -> dict[str, Any]:
-        """The values of an entry; those of plugins' keys are in its `extra`, images among them opened."""
+        """Return the values of an entry, with those of plugins' keys in its `extra`, where images are opened."""
         return self._split(section, entry, plain(entry, self.sections[section]))
 
     def _split(self, section: str, entry: Value, values: dict[str, Any]) -> dict[str, Any]:
@@ -273,7 +273,7 @@ class _Reader:
         self.materials.append(scene_values.material(name, values, textures))
 
     def _generated(self, slot: str, values: Mapping[str, Any]) -> Texture:
-        """One slot's map of a generated texture."""
+        """Return one slot's map of a generated texture."""
         kind = self.kinds[values["kind"]]
         given = {"seed": 0, "resolution": 512, **{key.name: key.default for key in kind.keys}, **values}
         rate = 1 / given.pop("scale", 1.0)
@@ -298,7 +298,7 @@ class _Reader:
                 raise self._over(entry, f"{len(self.lights):,} lights", "lights")
 
     def _copies(self, section: str, name: str, entry: Value, values: dict[str, Any]) -> Copies | None:
-        """The copies of an entry, none for one whose `repeat` is wrong; None without `repeat`."""
+        """Return the copies of an entry, zero if its `repeat` is wrong; None without `repeat`."""
         repeat = values.pop("repeat", None)
         if not repeat:
             return None
@@ -333,7 +333,7 @@ class _Reader:
     def _camera(self, name: str, entry: Value) -> None:
         self.recipe["cameras", name] = values = self._plain("cameras", entry)
         eye = values.get("eye", (0.0, 0.0, 5.0))
-        ahead: Any = tuple(np.add(eye, (0, 0, -1)).tolist()) if "follow" in values else None  # until objects are read
+        ahead: Any = tuple(np.add(eye, (0, 0, -1)).tolist()) if "follow" in values else None  # replaced later
         try:
             self.cameras[name] = scene_values.camera(name, values, ahead)
         except ValueError as problem:
@@ -373,9 +373,9 @@ class _Reader:
         return None
 
     def _check_sky(self, entry: Value, file: str, values: Mapping[str, Any]) -> bool:
-        """Report keys that only skies have, that need each other, or that contradict each other."""
+        """Report keys that need a sky, need each other, or contradict each other."""
         given = {key: value for key in scene_keys.SKY_KEYS if (value := entry.get(key)) and value.data is not None}
-        wrong = {} if file in SKIES else {key: f"'{key}' goes with a sky, such as `file: sky`" for key in given}
+        wrong = {} if file in SKIES else {key: f"'{key}' requires a sky, such as `file: sky`" for key in given}
         for key, other in (("place", "time"), ("time", "place")):
             if key in given and other not in given:
                 wrong.setdefault(key, f"'{key}' needs '{other}' beside it")
@@ -383,7 +383,7 @@ class _Reader:
             try:
                 datetime.fromisoformat(values["time"])
             except ValueError as problem:
-                wrong["time"] = f"'time' is no date and time: {problem}"
+                wrong["time"] = f"'time' is not a date and time: {problem}"
         ways = [key for key in ("sun", "elevation_degrees", "time") if key in given]
         if len(ways) > 1:
             wrong.setdefault(ways[1], f"'{ways[0]}' and '{ways[1]}' both say where the sun is; keep one")
@@ -432,7 +432,7 @@ class _Reader:
     def _shape(
         self, name: str, entry: Value, values: dict[str, Any], placed: Sequence[tuple[str, Matrix, str | None]]
     ) -> None:
-        """Add the copies of a shape, which share its mesh; copies of one material share those of its parts, too."""
+        """Add the copies of a shape, which share its mesh; copies with the same material also share its parts."""
         shape = values["shape"]
         numbers = {key.name: values.get(key.name, key.default) for key in SHAPES[shape].keys}
         key = (shape, *sorted(numbers.items()))
@@ -500,7 +500,7 @@ class _Reader:
         self.placements[name] = Placement(tuple(objects), tuple(lights), tuple(cameras))
 
     def _resolve(self, place: Value) -> Path:
-        """Return the path that is written at a place; one that the user typed may lead anywhere."""
+        """Return the path written at a place; the user's own may be anywhere."""
         source, file = place.source, str(place.data)
         if isinstance(source.origin, Option):
             return Path(file).resolve()
@@ -537,7 +537,7 @@ class _Reader:
         return self.files[key]
 
     def _playback(self, name: str, entry: Value, scene: Scene) -> dict[str, Any] | None:
-        """The clip that an object plays, and how; None at rest."""
+        """Return the clip that an object plays, and its speed and start; None at rest."""
         if (place := entry.get("animation")) is None or place.data is None:
             return None
         clips: Mapping[str, Any] = scene.rigs[0].clips if scene.rigs else {}
@@ -554,7 +554,7 @@ class _Reader:
     def _overrides(
         self, entries: Mapping[str, Value], name: str, scene: Scene, materials: Sequence[str]
     ) -> dict[str, dict[str, Any]]:
-        """Node or part name to its changed values."""
+        """Return the changed values by name of node or part."""
         known = dict.fromkeys(word for part in scene.objects for word in (part.node, part.name))
         for node, entry in entries.items():
             if node not in known:
@@ -602,7 +602,7 @@ class _Reader:
     def _curve(
         self, path: str, entry: Value, frames: list[tuple[float, Any]], words: Mapping[str, Any]
     ) -> Curve | None:
-        """The values over time; None after a mistake."""
+        """Return the values over time; None after a mistake."""
         turns = words.get("slerp", False)
         if turns and not (path.startswith("objects.") and path.endswith(".rotate_degrees")):
             text = f"keyframes of '{shown(path)}': 'slerp' is for the 'rotate_degrees' of objects"
@@ -618,10 +618,10 @@ class _Reader:
         return None
 
     def _named_key(self, path: str, entry: Value, names: dict[str, tuple[str, ...]]) -> Key | None:
-        """The key that a dotted path names; only numbers, vectors and colours can be animated."""
+        """Return the key that a dotted path names; only numbers, vectors and colours can be animated."""
         section, _, rest = path.partition(".")
         name, key = ("", rest) if section == "environment" else rest.rpartition(".")[::2]
-        if section == "nodes" and name and key:  # whether the pipeline has it is another question
+        if section == "nodes" and name and key:  # checked when the pipeline is known
             return scene_keys.NODE_VALUE
         known = names.get(section, ())
         moving: dict[str, Key] = {}
@@ -644,7 +644,7 @@ class _Reader:
 
 
 def _unknown_keys(root: Value) -> dict[str, set[str]]:
-    """By section the keys of entries, of overrides and of keyframes that rendergraph itself does not know."""
+    """Return by section the keys of entries, overrides and keyframes that are not rendergraph's own."""
     found: dict[str, set[str]] = {}
     own = {key.name for key in scene_keys.OVERRIDE.keys}
     for section in get_args(Section):
@@ -661,7 +661,7 @@ def _unknown_keys(root: Value) -> dict[str, set[str]]:
 
 
 def _kinds(root: Value) -> set[str]:
-    """The kinds of generated textures that a file asks for."""
+    """Return the kinds of generated textures that a file uses."""
     values = [value for entry in _entries(root, "materials").values() for value in entry.mapping.values()]
     return {str(kind.data) for value in values if (kind := value.get("kind")) is not None}
 
@@ -677,5 +677,5 @@ def _listed(value: Value | None) -> list[Value]:
 
 def _value(entry: Value, key: str) -> Value:
     value = entry.get(key)
-    assert value is not None  # the caller has read it
+    assert value is not None  # checked by the caller
     return value

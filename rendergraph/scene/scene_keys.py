@@ -1,4 +1,4 @@
-"""Every key of a scene file: what it takes, its unit and its default. Checking, docs and `explain scene` read this."""
+"""Every key of a scene file with its type, unit and default, for checking, docs and `explain scene`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from rendergraph.scene.shapes import LENGTH, SHAPES
 from rendergraph.scene.textures import TEXTURES as TEXTURE_KINDS
 from rendergraph.typecheck import Brief, JsonSchema, Schema, is_numeric
 
-_DIRECTION = "unit length is not needed"
+_DIRECTION = "of any length"
 
 NAME: Any = Annotated[TEXT, Brief("name")]
 TIME: Any = word(
@@ -41,19 +41,19 @@ TIME: Any = word(
 )
 
 MOST_COPIES = 10_000_000
-"""Limit of one number under `repeat`; those of a scene are in `SceneLimits`."""
+"""Limit of one number under `repeat`; limits of a scene are in `SceneLimits`."""
 _COPIES: Any = whole(1, MOST_COPIES)
 
 
 def _share(name: str, what: str) -> Key:
-    return Key(name, number(0, 1), f"Greatest share by which {what} changes, up or down.", 0.0)
+    return Key(name, number(0, 1), f"Maximum fraction by which {what} changes, up or down.", 0.0)
 
 
 def _repeat(vary: tuple[Key, ...], choose: tuple[Key, ...]) -> Table:
-    """The table of copies of an entry; `vary` and `choose` may change these keys from copy to copy."""
+    """Return the table of copies of an entry; `vary` and `choose` may change these keys from copy to copy."""
     spread = "number, or one for each axis; each copy gets a random value from minus to plus this"
     at = Key("at", scale(), f"Random displacement: a {spread}.", (0.0, 0.0, 0.0), "m")
-    turn = Key("rotate_degrees", scale(), f"Random turn: a {spread}.", (0.0, 0.0, 0.0), "°")
+    turn = Key("rotate_degrees", scale(), f"Random rotation: a {spread}.", (0.0, 0.0, 0.0), "°")
     order = Key("order", choice("random", "turn"), "Pick at random, or one after the other (`turn`).", "random")
     return Table(
         "repeat",
@@ -65,7 +65,7 @@ def _repeat(vary: tuple[Key, ...], choose: tuple[Key, ...]) -> Table:
             Key("file", FILE, "A file with a row for each copy (.csv, .npz, .json); positions are added to `at`."),
             Key("vary", Table("vary", (at, turn, *vary)), "Random changes of each copy."),
             Key("choose", Table("choose", (order, *choose)), "Lists of values, of which each copy gets one."),
-            Key("seed", whole(0, 2**32 - 1), "Another seed gives other random numbers.", 0),
+            Key("seed", whole(0, 2**32 - 1), "Seed of the random numbers.", 0),
         ),
         {
             "grid": (
@@ -75,9 +75,9 @@ def _repeat(vary: tuple[Key, ...], choose: tuple[Key, ...]) -> Table:
             "line": (Key("step", vector(), "With `line`: vector from one copy to the next.", (1.0, 0.0, 0.0), "m"),),
             "ring": (
                 Key("radius", LENGTH, "With `ring`: radius of the circle.", 1.0, "m"),
-                Key("start_degrees", number(), "With `ring`: where the first copy is: 0 at +x, 90 at -z.", 0.0, "°"),
+                Key("start_degrees", number(), "With `ring`: angle of the first copy: 0 at +x, 90 at -z.", 0.0, "°"),
                 Key("arc_degrees", number(-360, 360), "With `ring`: the arc, both ends included.", 360.0, "°"),
-                Key("turned", bool, "With `ring`: copies turn with the circle, as spokes do.", False),
+                Key("turned", bool, "With `ring`: copies turn with the circle, like spokes.", False),
             ),
             "scatter": (Key("size", vector(3, 0), "With `scatter`: edges of the box.", (1.0, 1.0, 1.0), "m"),),
             "file": (),
@@ -86,7 +86,7 @@ def _repeat(vary: tuple[Key, ...], choose: tuple[Key, ...]) -> Table:
 
 
 _OVERRIDABLE = (
-    Key("material", NAME, "A name under `materials`; a file keeps its own materials without it."),
+    Key("material", NAME, "A name under `materials`; without it, a file keeps its own materials."),
     Key("casts_shadow", bool, "Whether shadow techniques draw it.", True),
     Key("hidden", bool, "Not drawn at all.", False),
 )
@@ -97,26 +97,26 @@ ANIMATION = Table(
     (
         Key("clip", NAME, "Name of one of the file's clips, by default its first; `explain FILE` lists them."),
         Key("speed", number(), "Seconds of the clip for each second; less than 0 plays it backwards.", 1.0),
-        Key("start", number(), "Where in the clip frame 1 is.", 0.0, "s"),
+        Key("start", number(), "Time in the clip at frame 1.", 0.0, "s"),
     ),
 )
-_PLAYS = Key("animation", ANIMATION, "For a file: plays a clip over and over; without it the file is at rest.")
-_VARIANT = Key("variant", NAME, "For a file: one of its variants, which have other materials.")
+_PLAYS = Key("animation", ANIMATION, "For a file: loops a clip; without it the file is at rest.")
+_VARIANT = Key("variant", NAME, "For a file: one of its material variants.")
 OBJECT = Table(
     "object '{}'",
     (
         Key("shape", choice(*SHAPES), "A generated shape; its own keys are under `shape: …`."),
-        Key("file", FILE, "A mesh file (.obj, .gltf, .glb) instead of a shape; its lights and cameras come with it."),
-        Key("at", vector(), "Where its origin stands.", (0.0, 0.0, 0.0), "m"),
-        Key("rotate_degrees", vector(), "Turns about X, then Y, then Z.", (0.0, 0.0, 0.0), "°"),
-        Key("scale", scale(), "One factor, or one for each axis; applied before turning.", (1.0, 1.0, 1.0)),
+        Key("file", FILE, "A mesh file (.obj, .gltf, .glb) instead of a shape, with its lights and cameras."),
+        Key("at", vector(), "Position of its origin.", (0.0, 0.0, 0.0), "m"),
+        Key("rotate_degrees", vector(), "Rotation about X, then Y, then Z.", (0.0, 0.0, 0.0), "°"),
+        Key("scale", scale(), "One factor, or one for each axis; applied before the rotation.", (1.0, 1.0, 1.0)),
         *_OVERRIDABLE,
         Key(
             "repeat",
             _repeat(
                 (_share("scale", "the size"),), (Key("material", listed(NAME, "names", 1), "Names under `materials`."),)
             ),
-            "Draws it many times; the copies are called `name.0`, `name.1` and so on.",
+            "Draws many copies, called `name.0`, `name.1` and so on.",
         ),
     ),
     {"shape": {name: shape.keys for name, shape in SHAPES.items()}, "file": (_OVERRIDES, _PLAYS, _VARIANT)},
@@ -137,7 +137,7 @@ TEXTURES = (
     ("sheen_color_texture", "Sheen colour (sRGB)."),
     ("sheen_roughness_texture", "Roughness of the sheen in alpha."),
     ("iridescence_texture", "Iridescence factor in red."),
-    ("iridescence_thickness_texture", "Between the film's two thicknesses, in green."),
+    ("iridescence_thickness_texture", "Interpolates between the film's two thicknesses, in green."),
     ("transmission_texture", "Transmission factor in red."),
     ("thickness_texture", "Thickness factor in green."),
 )
@@ -145,7 +145,7 @@ TEXTURES = (
 
 _TEXTURE_KEYS = (
     Key("scale", LENGTH, "Width of one tile in texture coordinates: metres where a shape has `uv: metres`.", 1.0),
-    Key("seed", whole(0, 65535), "Another number gives another pattern.", 0),
+    Key("seed", whole(0, 65535), "Seed of the pattern.", 0),
     Key("resolution", whole(16, 4096), "Width and height of the images.", 512, "texels"),
 )
 
@@ -154,7 +154,7 @@ def texture_keys(kinds: Mapping[str, TextureKind]) -> tuple[Key, ...]:
     """Return the keys of a material that take textures; `kinds` are those that can be generated."""
     table = Table(
         "texture",
-        (Key("kind", choice(*kinds), "What it looks like; each has keys of its own."), *_TEXTURE_KEYS),
+        (Key("kind", choice(*kinds), "Pattern; each kind has keys of its own."), *_TEXTURE_KEYS),
         {"kind": {name: tuple(key.key for key in kind.keys) for name, kind in kinds.items()}},
     )
     doc = "A generated texture: base colour, normals, occlusion, roughness and metallic at once."
@@ -179,35 +179,35 @@ MATERIAL = Table(
         _unit("roughness", "Perceptual roughness; α is its square.", 1.0),
         Key("emissive", color(), "Emitted radiance.", (0.0, 0.0, 0.0)),
         Key("emissive_strength", number(0), "Factor on `emissive`.", 1.0),
-        _unit("occlusion_strength", "How much of the occlusion texture counts.", 1.0),
+        _unit("occlusion_strength", "Strength of the occlusion texture.", 1.0),
         Key("normal_scale", number(), "Factor on the normal texture's slope.", 1.0),
         Key("alpha_mode", choice("opaque", "mask", "blend"), "How alpha is used.", "opaque"),
-        _unit("alpha_cutoff", "With `mask`: less alpha than this is not drawn.", 0.5),
+        _unit("alpha_cutoff", "With `mask`: surfaces with a smaller alpha are not drawn.", 0.5),
         Key("double_sided", bool, "Back faces are drawn too.", False),
         Key("unlit", bool, "Base colour without lighting.", False),
         Key("ior", number(1, 10), "Index of refraction, which gives the dielectric f0.", 1.5),
         _unit("specular", "Factor on the dielectric's reflection.", 1.0),
         Key("specular_color", color(), "Colour of the dielectric's f0.", (1.0, 1.0, 1.0)),
-        _unit("anisotropy_strength", "0 isotropic.", 0.0),
+        _unit("anisotropy_strength", "0 is isotropic.", 0.0),
         Key("anisotropy_rotation", number(), "Counter-clockwise from the tangent.", 0.0, "rad"),
-        _unit("clearcoat", "A clear lacquer over everything else: its factor.", 0.0),
+        _unit("clearcoat", "Factor of a clear coat over everything else.", 0.0),
         _unit("clearcoat_roughness", "Roughness of the coat.", 0.0),
         Key("clearcoat_normal_scale", number(), "Factor on the slope of the coat's normal texture.", 1.0),
-        Key("sheen_color", color(1), "Colour of the light that fibres of cloth scatter.", (0.0, 0.0, 0.0)),
+        Key("sheen_color", color(1), "Colour of the light that cloth fibres scatter.", (0.0, 0.0, 0.0)),
         _unit("sheen_roughness", "Roughness of the sheen.", 0.0),
-        _unit("iridescence", "A thin film that interferes with light: its factor.", 0.0),
+        _unit("iridescence", "Factor of thin-film interference.", 0.0),
         Key("iridescence_ior", number(1, 10), "Index of refraction of the film.", 1.3),
-        Key("iridescence_thickness", vector(2, 0), "Thickness where the texture is 0 and 1.", (100.0, 400.0), "nm"),
-        _unit("transmission", "How much of the light that is not reflected passes through, as in glass.", 0.0),
-        Key("thickness", number(0), "Of the volume behind the surface; 0 is a thin wall.", 0.0, "m"),
-        Key("attenuation_distance", LENGTH, "Where `attenuation_color` is left; none by default.", None, "m"),
-        Key("attenuation_color", color(1), "What is left of white light after that distance.", (1.0, 1.0, 1.0)),
-        Key("dispersion", number(0), "20 / Abbe number: how far colours are refracted apart.", 0.0),
-        Key("shadow_catcher", bool, "Shows what is behind it, as dark as shadows and occlusion make it.", False),
-        Key("ambient", color(1), "ka of the empirical models; the base colour by default."),
-        Key("diffuse", color(1), "kd of the empirical models; base (1 − metallic) by default."),
-        Key("specular_phong", color(1), "ks of the empirical models; f0 by default."),
-        Key("shininess", number(0, 1_000_000), "Exponent n of `phong`; from the roughness by default."),
+        Key("iridescence_thickness", vector(2, 0), "Thickness for texture values 0 and 1.", (100.0, 400.0), "nm"),
+        _unit("transmission", "Fraction of the unreflected light that passes through, as in glass.", 0.0),
+        Key("thickness", number(0), "Thickness of the volume behind the surface; 0 is a thin wall.", 0.0, "m"),
+        Key("attenuation_distance", LENGTH, "Distance for `attenuation_color`; none by default.", None, "m"),
+        Key("attenuation_color", color(1), "Colour of white light after `attenuation_distance`.", (1.0, 1.0, 1.0)),
+        Key("dispersion", number(0), "20 / Abbe number: spread of refraction over colours.", 0.0),
+        Key("shadow_catcher", bool, "Shows the background, darkened by shadows and occlusion.", False),
+        Key("ambient", color(1), "ka of the empirical models; by default the base colour."),
+        Key("diffuse", color(1), "kd of the empirical models; by default base (1 − metallic)."),
+        Key("specular_phong", color(1), "ks of the empirical models; by default f0."),
+        Key("shininess", number(0, 1_000_000), "Exponent n of `phong`; by default from the roughness."),
         *texture_keys(TEXTURE_KINDS),
     ),
 )
@@ -216,13 +216,13 @@ LIGHT = Table(
     "light '{}'",
     (
         Key("type", choice("directional", "point", "spot"), "Kind of light.", required=True),
-        Key("at", vector(), "Where it is (point, spot).", (0.0, 0.0, 0.0), "m"),
-        Key("direction", vector(), f"Where its light goes (directional, spot); {_DIRECTION}.", (0.0, -1.0, 0.0)),
+        Key("at", vector(), "Position (point, spot).", (0.0, 0.0, 0.0), "m"),
+        Key("direction", vector(), f"Direction of its light (directional, spot), {_DIRECTION}.", (0.0, -1.0, 0.0)),
         Key("color", color(), "Linear colour.", (1.0, 1.0, 1.0)),
         Key("intensity", number(0), "Lux for directional, candela for point and spot.", 1.0, "lx, cd"),
-        Key("range", LENGTH, "Where its light is faded out (point, spot); none by default.", None, "m"),
-        Key("inner_degrees", number(0, 90), "Half angle of the spot's full brightness.", 0.0, "°"),
-        Key("outer_degrees", number(0, 90, above=True), "Half angle where the spot ends.", 45.0, "°"),
+        Key("range", LENGTH, "Distance at which its light fades to 0 (point, spot); none by default.", None, "m"),
+        Key("inner_degrees", number(0, 90), "Half angle of the spot's cone of full brightness.", 0.0, "°"),
+        Key("outer_degrees", number(0, 90, above=True), "Half angle of the spot's whole cone.", 45.0, "°"),
         Key("casts_shadow", bool, "Whether `shadow_map.light: auto` may choose it; rays find its shadows.", True),
         Key(
             "repeat",
@@ -233,7 +233,7 @@ LIGHT = Table(
                     Key("intensity", listed(number(0), "numbers from 0 up", 1), "Intensities."),
                 ),
             ),
-            "Makes many of it; the copies are called `name.0`, `name.1` and so on.",
+            "Adds many copies, called `name.0`, `name.1` and so on.",
         ),
     ),
 )
@@ -241,21 +241,21 @@ LIGHT = Table(
 CAMERA = Table(
     "camera '{}'",
     (
-        Key("eye", vector(), "Where it is.", (0.0, 0.0, 5.0), "m"),
-        Key("target", vector(), "What it looks at.", (0.0, 0.0, 0.0), "m"),
-        Key("follow", NAME, "Name of an object that it looks at, wherever that moves, in place of a target."),
-        Key("up", vector(), f"What is up in the picture; {_DIRECTION}.", (0.0, 1.0, 0.0)),
+        Key("eye", vector(), "Position of the camera.", (0.0, 0.0, 5.0), "m"),
+        Key("target", vector(), "Point that it looks at.", (0.0, 0.0, 0.0), "m"),
+        Key("follow", NAME, "Name of an object to look at, even if it moves, instead of `target`."),
+        Key("up", vector(), f"Direction that is up in the picture, {_DIRECTION}.", (0.0, 1.0, 0.0)),
         Key("fov_y_degrees", number(0.01, 179), "Vertical angle of a perspective camera.", 45.0, "°"),
-        Key("height", LENGTH, "Height of what an orthographic camera sees; makes it orthographic.", None, "m"),
-        Key("frustum", vector(4), "Left, right, bottom, top at the near plane; makes it off-centre.", None, "m"),
+        Key("height", LENGTH, "Height of the view; makes the camera orthographic.", None, "m"),
+        Key("frustum", vector(4), "Left, right, bottom, top at the near plane; makes the view off-centre.", None, "m"),
         Key(
             "aspect",
             number(0.01, 100),
-            "Width over height of the picture, where neither the pipeline nor the command line says its size.",
+            "Width over height of the picture, if neither the pipeline nor the command line gives a size.",
         ),
         Key("near", LENGTH, "Near plane.", 0.05, "m"),
         Key("far", number(0, above=True, infinite=True), "Far plane; `.inf` for none.", 100.0, "m"),
-        _unit("shutter", "How much of a frame's time it is open, for motion blur.", 0.0),
+        _unit("shutter", "Fraction of a frame's time for which it is open, for motion blur.", 0.0),
     ),
 )
 
@@ -264,11 +264,11 @@ ENVIRONMENT = Table(
     (
         Key("file", FILE, "Equirectangular image (.hdr, .exr), or a shipped one, such as `sky`."),
         Key("intensity", number(0), "Factor on its radiance.", 1.0),
-        Key("rotate_degrees", number(), "Turns it about +Y.", 0.0, "°"),
+        Key("rotate_degrees", number(), "Rotation about +Y.", 0.0, "°"),
         Key(
             "sun",
             vector(),
-            f"With a sky: where sunlight goes, by default as the first directional light; {_DIRECTION}.",
+            f"With a sky: direction of sunlight, {_DIRECTION}; by default that of the first directional light.",
         ),
         Key("elevation_degrees", number(-18, 90), "With a sky: height of the sun above the horizon.", unit="°"),
         Key(
@@ -277,12 +277,12 @@ ENVIRONMENT = Table(
         Key("place", row(number(-90, 90), number(-180, 180)), "With `time`: latitude and longitude.", unit="°"),
         Key("time", TIME, "With `place`: date and time for the sun, with its offset from UTC."),
         Key("turbidity", number(1, 10), "With a sky: haze, from 1 for clean air.", 1.8),
-        Key("overcast", number(0, 1), "With a sky: clouds, which hide the sun at 1.", 0.0),
-        Key("ground", bool, "Puts a ground below the objects that shows the image and receives shadows.", False),
+        Key("overcast", number(0, 1), "With a sky: cloud cover, which hides the sun at 1.", 0.0),
+        Key("ground", bool, "Adds a ground below the objects that shows the image and receives shadows.", False),
         Key(
             "ground_height",
             LENGTH,
-            "With `ground`: where the image was taken; suits the objects by default.",
+            "With `ground`: height at which the image was taken; by default chosen for the objects.",
             None,
             "m",
         ),
@@ -293,7 +293,7 @@ SKY_KEYS = ("sun", "elevation_degrees", "azimuth_degrees", "place", "time", "tur
 ORBIT = Table(
     "orbit",
     (
-        Key("camera", NAME, "Which camera; the default one where it is not given."),
+        Key("camera", NAME, "Name of a camera; by default the default camera."),
         Key("degrees_per_second", number(), "Speed, counter-clockwise seen from above.", 30.0, "°/s"),
     ),
 )
@@ -306,7 +306,7 @@ NAMES = {section: {key.name for key in table.keys} for section, table in SECTION
 
 
 def moving(table: Table) -> dict[str, Key]:
-    """The keys of a section's table that keyframes may change."""
+    """Return the keys of a section's table that keyframes may change."""
     return {key.name: key for key in table.keys if is_numeric(key.type)}
 
 
@@ -316,7 +316,7 @@ def with_plugins(
     """Return `SECTIONS` with the keys that plugins add, and with these kinds of generated textures.
 
     Args:
-        asked: the names that somebody uses, by section; two plugins with one of them are an error.
+        asked: the names in use, by section; two plugins with the same one of them are an error.
 
     Raises:
         InputError: a plugin's key has the name of one of rendergraph's own (RG495), or of another plugin's (RG496).
@@ -343,9 +343,9 @@ def with_plugins(
     return found
 
 
-NODE_VALUE = Key("value", number() | listed(number(), "numbers", 1), "Of a node's parameter.")
+NODE_VALUE = Key("value", number() | listed(number(), "numbers", 1), "Value of a node's parameter.")
 EASE = Key("ease", choice("linear", "smooth", "step"), "Between two keys: `smooth` starts and ends at rest.", "linear")
-SLERP = Key("slerp", bool, "Turn the shorter way from key to key, about one axis (`rotate_degrees`).", False)
+SLERP = Key("slerp", bool, "Rotate along the shorter arc from key to key, about one axis (`rotate_degrees`).", False)
 
 
 def _curve(type: Any) -> Schema:
@@ -380,22 +380,22 @@ def scene_table(sections: Mapping[str, Table] = SECTIONS) -> Table:
             Key(
                 "lights",
                 MapOf(sections["lights"]),
-                "Lights, by name; without any, and without an environment, a directional key of 3 lux comes over the "
-                "viewer's left shoulder, and `studio` is around.",
+                "Lights, by name; without lights and environment, a directional key light of 3 lux shines over the "
+                "viewer's left shoulder, and the environment is `studio`.",
             ),
             Key(
                 "cameras",
                 MapOf(sections["cameras"]),
-                "Cameras, by name, the first is the default; without any the scene is framed.",
+                "Cameras, by name; the first is the default. Without any, a camera frames the scene.",
             ),
-            Key("environment", ENVIRONMENT, "What is around the scene and lights it."),
+            Key("environment", ENVIRONMENT, "Environment map that surrounds and lights the scene."),
             Key(
                 "keyframes",
                 keyframes,
-                "Dotted path (`cameras.main.eye`, `nodes.bloom.intensity`) to seconds and values, held outside; beside "
-                "them `ease: smooth` or `step`, and `slerp: true` for `rotate_degrees`.",
+                "Dotted path (`cameras.main.eye`, `nodes.bloom.intensity`) to seconds and values, held outside; also "
+                "`ease: smooth` or `step`, and `slerp: true` for `rotate_degrees`.",
             ),
-            Key("orbit", ORBIT, "A camera that turns about its target."),
+            Key("orbit", ORBIT, "A camera that orbits its target."),
         ),
     )
 

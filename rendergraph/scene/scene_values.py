@@ -1,4 +1,4 @@
-"""Materials, lights, cameras and placements from a scene file's values; keyframes build them again in between."""
+"""Build materials, lights, cameras and placements from a scene file's values; keyframes rebuild them."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from rendergraph.scene.geometry import euler_matrix, placement, vec3
 from rendergraph.scene.model import Camera, Light, Material, Matrix, Texture, Vec3
 
 _PLAIN = frozenset(Material.__struct_fields__) - {"name", "emissive", "textures"}
-"""Fields of a material that are values as a scene file has them; `extra` holds those of plugins' keys."""
+"""Fields of a material that equal a scene file's values; `extra` holds those of plugins' keys."""
 
 
 def material(name: str, values: Mapping[str, Any], textures: Mapping[str, Texture]) -> Material:
     given = {key: value for key, value in values.items() if key in _PLAIN}
     r, g, b = values.get("emissive", (0.0, 0.0, 0.0) if "emissive" not in textures else (1.0, 1.0, 1.0))
     strength = values.get("emissive_strength", 1.0)
-    if "metallic_roughness" in textures:  # a texture scales its factor: without one it counts whole
+    if "metallic_roughness" in textures:  # a texture is multiplied by its factor, so without a factor it counts fully
         given.setdefault("metallic", 1.0)
     return Material(name, emissive=(r * strength, g * strength, b * strength), textures=textures, **given)
 
 
 def light(name: str, values: Mapping[str, Any]) -> Light:
-    """Return a light; a mistake is a ValueError."""
+    """Return a light; raise ValueError for a mistake."""
     direction = unit(values.get("direction", (0.0, -1.0, 0.0)))
     if not direction.any():
         raise ValueError("'direction' has no length")
@@ -50,7 +50,7 @@ def light(name: str, values: Mapping[str, Any]) -> Light:
 
 
 def camera(name: str, values: Mapping[str, Any], followed: Vec3 | None = None) -> Camera:
-    """Return a camera, which looks at `followed` if it follows an object; a mistake is a ValueError."""
+    """Return a camera, which looks at `followed` if it follows an object; raise ValueError for a mistake."""
     near, far = values.get("near", 0.05), values.get("far", 100.0)
     if near >= far:
         raise ValueError(f"'near' ({near:g}) must be below 'far' ({far:g})")
@@ -87,7 +87,7 @@ def camera(name: str, values: Mapping[str, Any], followed: Vec3 | None = None) -
 
 
 def placed(values: Mapping[str, Any]) -> Matrix:
-    """Return the transform of an object: scaled, turned, moved."""
+    """Return the transform of an object: scale, then rotation, then translation."""
     rotation = values.get("rotation")
     if rotation is None:
         rotation = euler_matrix(values.get("rotate_degrees", (0.0, 0.0, 0.0)))
@@ -95,14 +95,14 @@ def placed(values: Mapping[str, Any]) -> Matrix:
 
 
 def light_matrix(original: Light) -> Matrix:
-    """Return a light as a transform to its position, its -Z in its direction."""
+    """Return the transform of a light: at its position, with -Z along its direction."""
     matrix = look_at((0.0, 0.0, 0.0), original.direction)
     matrix[:3, 3] = original.position
     return matrix
 
 
 def moved_light(original: Light, matrix: Matrix) -> Light:
-    """Return a light with the position and direction of a transform; scale does not count."""
+    """Return a light with the position and direction of a transform, whose scale is ignored."""
     direction = unit(-matrix[:3, 2])
     moved = replace(original, position=vec3(matrix[:3, 3]))
     return replace(moved, direction=vec3(direction)) if direction.any() else moved

@@ -1,4 +1,4 @@
-"""The shipped shapes, which lie beside the shipped scenes: they are content, like environments."""
+"""The shipped shapes, stored beside the shipped scenes because they are content, like environments."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The shipped kinds of generated textures, which lie beside the shipped scenes: they are content, like shapes."""
+"""The shipped kinds of generated textures, stored beside the shipped scenes because they are content, like shapes."""
 
 from __future__ import annotations
 

@@ -1,22 +1,22 @@
-"""The buffer behind `trace.glsl`: trees over the triangles of meshes, and one over the objects. No GL.
+"""The buffer behind `trace.glsl`: BVHs over the triangles of meshes, and one over the objects. No GL.
 
-Objects that never move share one tree over all their triangles in world space, because where boxes of objects overlap,
-a ray has to enter one object after the other. It stands in the tree over objects as one object more. The others have
-the tree of their mesh.
+Objects that never move share one tree over all their triangles in world space, because a ray must traverse overlapping
+objects one after the other. The shared tree counts as one more object in the tree over objects. Other objects use the
+tree of their mesh.
 
-The buffer consists of rows of four 32-bit words. Boxes are rounded outwards to a grid of 16 bits over the box of
-their tree: a node with the boxes of both children has 32 bytes; a ray is transformed to the grid once a tree.
-An object that is scaled to a plane, whose matrix has no inverse, is traced as a very thin one.
+The buffer consists of rows of four 32-bit words. Boxes are rounded outwards to a 16-bit grid over the box of their
+tree: a node with the boxes of both children has 32 bytes; a ray is transformed to the grid once per tree. An object
+that is scaled to a plane, whose matrix has no inverse, is traced as a very thin one.
 
 | rows | content |
 | --- | --- |
 | 2 | grid of the tree over objects: origin and root reference, scale and the row where triangles begin |
-| 5 an object | rows of the world-to-object matrix; grid of its mesh: origin and root reference, scale and flags |
+| 5 per object | rows of the world-to-object matrix; grid of its mesh: origin and root reference, scale and flags |
 | 5 | the same for the shared tree, whose flags are -1 |
-| 2 a node | least corners of both boxes and the left reference, greatest corners and the right one |
-| 3 a triangle | its corners; its number within the mesh, in the shared tree its object and the flags of that, else -1 |
+| 2 per node | minimum corners of both boxes and the left reference, maximum corners and the right one |
+| 3 per triangle | its corners; its number within the mesh; in the shared tree its object and its flags, else -1 |
 
-Corners of two boxes share words; the left one has the lower 16 bits. A reference is a row, or below 0 a leaf:
+Corners of two boxes share words; the left one has the lower 16 bits. A reference is a row, or a leaf if below 0:
 `-1 - object` in the tree over objects, and `leaf(first, count)` of triangles otherwise.
 """
 
@@ -35,28 +35,28 @@ from rendergraph.scene.pack import PackedScene
 
 Rows: TypeAlias = npt.NDArray[np.int32]
 
-_CELLS = 65533  # of a grid, with room for rounding
-_MARGIN = 0.02  # cells that boxes are larger, for the rounding of rays
+_CELLS = 65533  # cells of a grid, with room for rounding
+_MARGIN = 0.02  # cells by which boxes are enlarged, for the rounding of rays
 _HEADER, _OBJECT, _NODE, _TRIANGLE = 2, 5, 2, 3  # rows
 _NOTHING = 0x7FFFFFFF  # the root reference of an empty tree
 _THINNEST = 1e-6  # thickness of an object that is scaled to a plane, relative to its size
-_FINEST = 8  # cells of the shared tree's grid that the triangles of an object in it measure at least
-_MOST_COPIES = 1 << 17  # triangles of the shared tree that are there several times
+_FINEST = 8  # minimum size of an object's triangles in the shared tree, in cells of its grid
+_MOST_COPIES = 1 << 17  # limit of copied triangles in the shared tree
 
 _Shape: TypeAlias = tuple[Floats, npt.NDArray[np.uint32]]
 """Positions (v, 3) and triangles (t, 3)."""
 
 
 class MeshTrees(Struct, frozen=True, eq=False):
-    """The part of the buffer that stays as it is while objects move. The shared tree follows those of m meshes.
+    """The part of the buffer that does not change while objects move. The shared tree follows those of m meshes.
 
     Attributes:
         rows: nodes and triangles of all trees.
         grids: float32 (m + 1, 2, 3), origin and scale of each tree's grid.
-        roots: int32 (m + 1,), references to each tree's topmost node.
-        triangles_at: the row of the buffer where triangles begin.
+        roots: int32 (m + 1,), references to each tree's root.
+        triangles_at: the first row of triangles in the buffer.
         shared: bool (n,), which objects are in the shared tree.
-        box: float32 (2, 3), its corners.
+        box: float32 (2, 3), the corners of the shared tree's box.
         tree: the shared tree.
     """
 
@@ -75,25 +75,25 @@ def first_rows(objects: int) -> int:
 
 
 def _copies(scene: Scene) -> int:
-    """The most triangles that the shared tree has several times."""
+    """Return an upper bound on the number of copied triangles in the shared tree."""
     uses = Counter(placed.mesh for placed in scene.objects)
     return min(sum(len(scene.meshes[mesh].indices) * count for mesh, count in uses.items() if count > 1), _MOST_COPIES)
 
 
 def most_bytes(scene: Scene) -> int:
-    """Return a limit of the buffer's bytes, known before any tree is built."""
+    """Return an upper bound on the buffer's bytes, known before any tree is built."""
     triangles = sum(len(mesh.indices) for mesh in scene.meshes) + _copies(scene)
     return 16 * (first_rows(len(scene.objects)) + (_NODE + _TRIANGLE) * triangles)
 
 
 def stack_size(scene: Scene) -> int:
-    """Return how many entries a traversal needs at most, known before any tree is built."""
+    """Return an upper bound on the entries of a traversal's stack, known before any tree is built."""
     triangles = sum(len(mesh.indices) for mesh in scene.meshes) + _copies(scene)
-    return depth_limit(len(scene.objects)) + depth_limit(triangles) + 3  # the end, a way back to the objects, one more
+    return depth_limit(len(scene.objects)) + depth_limit(triangles) + 3  # end, way back to the objects, one more
 
 
 def _moving(scene: Scene) -> set[int]:
-    """The objects that are elsewhere or have another shape at another time."""
+    """Return the objects whose position or shape changes over time."""
     names = {path.partition(".")[2].rpartition(".")[0] for path in scene.keyframes if path.startswith("objects.")}
     for name in list(names):
         if (copies := scene.copies.get(("objects", name))) is not None:
@@ -103,9 +103,9 @@ def _moving(scene: Scene) -> set[int]:
 
 
 def _shared(scene: Scene, packed: PackedScene) -> npt.NDArray[np.bool_]:
-    """Which objects share a tree (n,): those that stay where they are, and that its grid can tell apart.
+    """Return which objects share a tree (n,): those that do not move and are large enough for its grid.
 
-    Of meshes with several objects, the smallest are copied.
+    Meshes with several objects are copied, smallest first, up to the limit.
     """
     counts = packed.meshes["count"][packed.object_mesh] // 3
     found = ~packed.hidden & (counts > 0)
@@ -125,13 +125,13 @@ def _shared(scene: Scene, packed: PackedScene) -> npt.NDArray[np.bool_]:
 def mesh_trees(
     scene: Scene, packed: PackedScene, flags: npt.NDArray[np.int32], before: MeshTrees | None = None
 ) -> MeshTrees:
-    """Build the trees that do not exist yet, all at once, and lay all of them out; meshes keep their trees.
+    """Build all missing trees at once, and lay all trees out; meshes cache their trees.
 
     Args:
-        scene: with the meshes.
-        packed: the scene, with positions as they are now.
+        scene: the scene with the meshes.
+        packed: the scene with current positions.
         flags: int32 (n,), the flags of each object's `SceneInstance`.
-        before: what this returned when animated meshes had another pose.
+        before: the result for an earlier pose of animated meshes.
     """
     shared = _shared(scene, packed)
     held: list[dict[str, Any]] = [mesh.__dict__ for mesh in scene.meshes]
@@ -151,7 +151,7 @@ def mesh_trees(
             held[number]["tree"] = tree
     empty = Tree(np.zeros((0, 2, 6), np.float32), np.zeros((0, 2), np.int32), np.zeros(0, np.int32), 0, 0)
     trees: list[Tree] = [one["tree"] if n in needed else empty for n, one in enumerate(held)]
-    for number in packed.vertex_orders.keys() & needed:  # animated meshes may be in another pose by now
+    for number in packed.vertex_orders.keys() & needed:  # the pose of animated meshes may have changed
         trees[number] = refit(trees[number], triangle_boxes(*shapes[number]))
     at, first = first_rows(len(scene.objects)), 0
     parts, grids, roots = [np.zeros((0, 4), np.int32)], np.ones((len(trees), 2, 3), np.float32), []
@@ -176,7 +176,7 @@ def mesh_trees(
 
 
 def _in_world(packed: PackedScene, shapes: list[_Shape], objects: npt.NDArray[np.int64]) -> _Shape:
-    """All triangles of some objects in world space, one object after the other."""
+    """Return all triangles of some objects in world space, object by object."""
     positions, triangles, first = [np.zeros((0, 3), np.float32)], [np.zeros((0, 3), np.uint32)], 0
     for number in objects:
         local, indices = shapes[packed.object_mesh[number]]
@@ -188,12 +188,12 @@ def _in_world(packed: PackedScene, shapes: list[_Shape], objects: npt.NDArray[np
 
 
 def object_rows(packed: PackedScene, flags: npt.NDArray[np.int32], trees: MeshTrees) -> Rows:
-    """Return the rows before those of meshes, with a tree over the objects where they are now.
+    """Return the rows before those of meshes, with a tree over the objects at their current positions.
 
     Args:
         packed: the scene.
         flags: int32 (n,), the flags of each object's `SceneInstance`.
-        trees: of its meshes.
+        trees: the trees of its meshes.
     """
     count = len(packed.object_mesh)
     rows = np.zeros((first_rows(count), 4), np.int32)
@@ -220,20 +220,20 @@ def object_rows(packed: PackedScene, flags: npt.NDArray[np.int32], trees: MeshTr
 
 
 def _references(children: npt.NDArray[np.int32], at: int, first: int) -> npt.NDArray[np.int32]:
-    """References of a mesh's tree within the buffer: nodes begin at a row, triangles at a number."""
+    """Return references of a mesh's tree within the buffer: nodes begin at a row, triangles at a number."""
     return np.where(children < 0, children - LEAF * first, at + _NODE * children)
 
 
 def _objects(
     children: npt.NDArray[np.int32], at: int, tree: Tree, objects: npt.NDArray[np.int64]
 ) -> npt.NDArray[np.int32]:
-    """References of the tree over objects, whose leaves have one each."""
+    """Return references of the tree over objects, whose leaves have one object each."""
     leaves = -1 - objects[tree.order[np.maximum(-1 - children, 0) // LEAF]]
     return np.where(children < 0, leaves, at + _NODE * children).astype(np.int32)
 
 
 def _grid(boxes: Floats) -> Floats:
-    """Origin and scale, float32 (2, 3), of the grid over all boxes (n, 2, 6)."""
+    """Return origin and scale, float32 (2, 3), of the grid over all boxes (n, 2, 6)."""
     if not len(boxes):
         return np.stack([np.zeros(3, np.float32), np.ones(3, np.float32)])
     low = boxes[:, :, :3].min(axis=(0, 1)).astype(np.float64)
@@ -243,7 +243,7 @@ def _grid(boxes: Floats) -> Floats:
 
 
 def _node_rows(boxes: Floats, children: npt.NDArray[np.int32], grid: Floats) -> Rows:
-    """Rows of nodes with their boxes (n, 2, 6), rounded outwards, and references (n, 2)."""
+    """Return rows of nodes with their boxes (n, 2, 6), rounded outwards, and references (n, 2)."""
     low, scale = grid.astype(np.float64)
     rows = np.zeros((len(boxes), _NODE, 4), np.uint32)
     for row, corner, rounded, margin in ((0, slice(0, 3), np.floor, -_MARGIN), (1, slice(3, 6), np.ceil, _MARGIN)):
@@ -256,7 +256,7 @@ def _node_rows(boxes: Floats, children: npt.NDArray[np.int32], grid: Floats) -> 
 
 
 def _inverses(packed: PackedScene) -> tuple[Matrix, npt.NDArray[np.bool_]]:
-    """Rows of the world-to-object matrices, float64 (n, 3, 4), and whether an object has any extent at all (n,)."""
+    """Return rows of the world-to-object matrices, float64 (n, 3, 4), and whether an object has any extent (n,)."""
     rows = packed.instances["rows"].astype(np.float64)
     linear = rows[:, :, :3]
     size = np.abs(linear).max(axis=(1, 2), initial=0.0)

@@ -1,8 +1,8 @@
-"""Steps to Schedule: which steps run, in which order, and why.
+"""Schedule steps: which steps run, in which order, and why.
 
-The order minimises what is allocated: the bytes of a pool of textures shared within a texel class, then the peak of
-live bytes. The least peak over all orders is searched for separately and reported beside it (`lower_bound_bytes`,
-`proven`), as what a heap of bytes could reach. So an order above that peak is taken only if it allocates less.
+The order minimises allocated memory: the bytes of a pool of textures shared within a texel class, then the peak of live
+bytes. The least peak over all orders is searched separately and reported as well (`lower_bound_bytes`, `proven`): a
+heap of bytes could reach it. So an order with a higher peak is chosen only if it allocates less.
 """
 
 from __future__ import annotations
@@ -33,27 +33,27 @@ from rendergraph.schedule.reasons import step_names as step_names
 from rendergraph.schedule.seeds import program_order, random_order, seeds
 from rendergraph.steps import MOST_STEPS, Resource, Step
 
-# What a second of budget buys: resources looked at, so that a slow machine comes to the same schedule as a fast one.
+# Resources visited per second of budget: a count, so that slow and fast machines find the same schedule.
 LOOKS_PER_SECOND = 1_000_000
-# Sets of steps are bit masks: beyond this the search would copy more than it decides.
+# Sets of steps are bit masks: beyond this size, copying them dominates the search.
 MOST_SEARCHED = 1_000
 
 
 class Schedule(Struct, frozen=True, dict=True):
-    """Steps culled and ordered.
+    """The steps that run, in order.
 
     Attributes:
         outputs: as in `Expansion`: output name to resource id.
         culled: node id to the reason why none of its steps runs.
-        peak_bytes: the most bytes of live resources at any step, in this order.
-        least_peak_bytes: the least peak of any order found; this order's may be higher, as it allocates less.
+        peak_bytes: the maximum of live bytes over the steps in this order.
+        least_peak_bytes: the least peak of any order found; this order's may be higher, because it allocates less.
         lower_bound_bytes: no legal order has a lower peak.
         whole_frame: ids of the resources that keep their memory for the whole frame: history, kept values, and buffers
             that the CPU fills before the first step.
-        waits: step key to the steps it waits for, with the resource that is the reason and `reads`, `continues` or
-            `overwrites`; empty for a schedule made by hand.
-        model: the same in numbers; None for a schedule made by hand.
-        chosen: what picked the order if not memory: `in the program's order`.
+        waits: step key to the steps that it waits for, with the resource as reason and `reads`, `continues` or
+            `overwrites`; empty for a schedule written by hand.
+        model: the same as integers; None for a schedule written by hand.
+        chosen: how the order was chosen if not by memory: `in the program's order`.
     """
 
     steps: tuple[Step, ...]
@@ -71,12 +71,12 @@ class Schedule(Struct, frozen=True, dict=True):
 
     @property
     def proven(self) -> bool:
-        """Whether the least peak found is the least of all legal orders."""
+        """Whether the least peak found is proven to be the minimum over all legal orders."""
         return self.least_peak_bytes == self.lower_bound_bytes
 
     @cached_property
     def shown(self) -> frozenset[str]:
-        """Ids of the resources that keep their memory from their first write to the frame's end."""
+        """Ids of the resources that keep their memory from their first write to the end of the frame."""
         return frozenset(self.outputs.values()) - self.whole_frame
 
     @cached_property
@@ -89,19 +89,19 @@ class Schedule(Struct, frozen=True, dict=True):
 
     @cached_property
     def history_copies(self) -> Mapping[str, int]:
-        """Number of textures of each history: one if it is read for the last time before it is written."""
+        """Number of textures of each history: one if its last read precedes its first write."""
         return history_copies(self.steps, self.resources)
 
 
 def schedule(
     expansion: Expansion, *, budget_s: float = 0.5, shuffle: int | None = None, keep_order: bool = False
 ) -> Schedule:
-    """Cull the steps that no output needs and put the rest in the order that allocates least.
+    """Cull the steps that no output needs and order the rest to allocate the least memory.
 
-    The result depends on links, ports and sizes alone: not on the order of nodes or keys in a file, nor on the machine.
+    The result depends only on links, ports and sizes, not on the order of nodes or keys in a file or on the machine.
 
     Args:
-        budget_s: longest search in seconds of an ordinary machine; it counts resources looked at, not time.
+        budget_s: limit of the search in seconds of a typical machine; it counts visited resources, not time.
         shuffle: seed of a random legal order instead, for tests.
         keep_order: use the program's order instead, for debugging; takes precedence over `shuffle`.
     """
@@ -152,7 +152,7 @@ def schedule(
 
 
 def _sinks(expansion: Expansion, kept: Sequence[Step], versions: Versions) -> list[Step]:
-    """Return the last writers of the outputs, by output name, then of what the next frame reads."""
+    """Return the last writers of the outputs, by output name, then those of resources that the next frame reads."""
     ids = [expansion.outputs[name] for name in sorted(expansion.outputs)]
     ids += sorted({read.resource for step in kept for read in step.all_reads if read.previous})
     finals = [versions.final(id) for id in ids]
@@ -160,7 +160,7 @@ def _sinks(expansion: Expansion, kept: Sequence[Step], versions: Versions) -> li
 
 
 class _SchedulingProblem(Struct, frozen=True):
-    """What is scheduled: steps, dependencies and resources."""
+    """The input of the search: steps, dependencies and resources."""
 
     kept: Sequence[Step]
     waits: Waits
@@ -179,7 +179,7 @@ class _SchedulingProblem(Struct, frozen=True):
 
 
 class _Ordering(Struct, frozen=True):
-    """An order that allocates little, its cost, the least peak found, and a peak that no order is below."""
+    """An order that allocates little, its cost, the least peak found, and a lower bound on the peak."""
 
     model: Model
     order: Sequence[int]
@@ -189,10 +189,10 @@ class _Ordering(Struct, frozen=True):
 
 
 def _least(problem: _SchedulingProblem, first: ReadFirst, budget_s: float) -> _Ordering:
-    """Return the best order over all choices of histories that are read before they are written.
+    """Return the best order over all choices of histories to read before they are written.
 
-    The other histories take a second texture. A choice is skipped if even the least memory for its textures could
-    not be better than what was found.
+    Other histories need a second texture. A choice is skipped if even the lower bound on its memory is no better than
+    the best order found.
     """
     base = problem.model(problem.waits)
     single = history_copies(base.steps, problem.resources) | dict.fromkeys(first.turns, 1)
@@ -218,7 +218,7 @@ def _least(problem: _SchedulingProblem, first: ReadFirst, budget_s: float) -> _O
 
 _MOST_ORDERS = 256
 _orders: dict[Hashable, tuple[Sequence[int], Cost, int, int]] = {}
-"""Results by model: most changes of a pipeline keep the order."""
+"""Results by model: most changes of a pipeline do not change the order."""
 
 
 def _optimise(model: Model, budget_s: float) -> _Ordering:
@@ -231,7 +231,7 @@ def _optimise(model: Model, budget_s: float) -> _Ordering:
 
 
 def _ordered(model: Model, budget: int) -> tuple[Sequence[int], Cost, int, int]:
-    """Return the numbers of the steps, the cost, the least peak found and the bound."""
+    """Return the steps' numbers in order, the cost, the least peak found and the bound."""
     if not len(model):
         return (), Cost(model.constant, model.constant, 0), model.constant, model.constant
     pool_bound, bound = model.bounds()
@@ -242,13 +242,13 @@ def _ordered(model: Model, budget: int) -> tuple[Sequence[int], Cost, int, int]:
             break
     least = min(cost.peak for cost, _ in orders)
     if least > bound and len(model) <= MOST_SEARCHED:
-        from rendergraph.schedule.search import search  # most pipelines are decided by now
+        from rendergraph.schedule.search import search  # most pipelines do not need a search
 
         better, bound = search(model, below=least, bound=bound, budget=budget)
         if better is not None:
             orders.append((model.cost(better), better))
             least = orders[-1][0].peak
-    # Equal costs go to the order found first: the reading order wherever nothing is better.
+    # For equal costs the order found first wins, which is the reading order.
     cost, best = min(orders, key=lambda pair: pair[0][:2])
     if cost.pool > pool_bound and len(model) <= MOST_SEARCHED:
         from rendergraph.schedule.search import improve  # as above

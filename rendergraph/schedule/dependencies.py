@@ -1,4 +1,4 @@
-"""Which steps run, and which must run before which: versions turned into a graph."""
+"""Dependencies of steps, derived from versions: which steps run, and in which partial order."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import TextureDesc
 
 MOST_TURNS = 4
-"""Histories of which each set is tried as those that are read before they are written: 16 sets."""
+"""Number of histories up to which every subset is tried as those read before they are written: 16 subsets."""
 
 StepKey: TypeAlias = tuple[str, int]
 """A step's `key`: node id and number."""
 
 Waits: TypeAlias = Mapping[StepKey, Mapping[StepKey, tuple[str, str]]]
-"""Step to the steps it waits for: the resource that is the reason, and `reads`, `continues` or `overwrites`."""
+"""Step to the steps that it waits for, with the resource as reason and `reads`, `continues` or `overwrites`."""
 
 Turns: TypeAlias = Mapping[str, tuple[StepKey, Sequence[StepKey]]]
-"""History to the step that first writes its next value, and the steps that are to read the last one before."""
+"""History to the step that first writes its next value, and the steps that must read the last value before."""
 
 
 def touched_ids(step: Step) -> dict[str, None]:
@@ -64,23 +64,23 @@ class Versions(Struct, frozen=True):
         return cls({id: dict(sorted(found.items())) for id, found in writers.items()}, dict(readers))
 
     def final(self, resource: str) -> Step | None:
-        """Return the step that writes the last version, None if no step does."""
+        """Return the step that writes the last version; None if no step does."""
         found = self.writers.get(resource)
         return found[next(reversed(found))] if found else None
 
 
 def continues(step: Step, write: Write, resource: Resource) -> bool:
-    """Whether some of the previous version remains after a step.
+    """Return whether some of the previous version remains after a step.
 
-    True for everything but a clear or discard of the whole texture: a part, a level of a mip chain, an image store and
-    a buffer leave the rest as it was.
+    True for everything except a clear or discard of the whole texture: writes of a part, a mip level, an image or a
+    buffer preserve the rest.
     """
     whole = write.mip is None and write.layer is None and getattr(resource.desc, "mips", 1) == 1
     return not whole or write.load == "load" or write.use in ("image", "buffer") or step.kind == "mipmaps"
 
 
 def is_filled_by_update(id: str, resource: Resource, versions: Versions) -> bool:
-    """Whether a buffer is filled by the CPU before the first step: a step reads it before any step writes it."""
+    """Return whether the CPU fills a buffer before the first step: a step reads it before any step writes it."""
     return not isinstance(resource.desc, TextureDesc) and (
         id not in versions.writers or any(version == 0 for version, _ in versions.readers.get(id, ()))
     )
@@ -93,9 +93,9 @@ def contributing(
     versions: Versions,
     idle: Mapping[str, str],
 ) -> list[Step]:
-    """Return the steps that some output depends on, in the order given.
+    """Return the steps on which any output depends, in the given order.
 
-    History that such a step reads from the last frame is needed as well: its writers stay.
+    If such a step reads history, the writers of the history are needed as well.
     """
     kept: set[StepKey] = set()
     problems: list[Problem] = []
@@ -121,7 +121,7 @@ def contributing(
                 writer = versions.writers.get(read.resource, {}).get(read.version)
                 made = resources.get(read.resource)
                 texture = made is None or (isinstance(made.desc, TextureDesc) and made.role != "scene")
-                if writer is None and texture and read.use != "attach":  # the write beside it says it better
+                if writer is None and texture and read.use != "attach":  # the attached write reports it better
                     problems.append(_unwritten(step, read.resource, versions, idle))
             if writer is not None:
                 stack.append(writer)
@@ -144,12 +144,12 @@ def dependencies(
 ) -> Waits:
     """Return the steps that each needed step waits for.
 
-    A reader follows the writer of its version; a writer follows the writer before it and all readers of what it
-    overwrites. A step's dependencies are in the order of its reads, then its writes, not in that of nodes.
-    `versions` are those of the needed steps alone. Steps that wait for each other are an error: that in `overwritten`
-    of the nodes that read and overwrite a texture, else RG602.
+    A reader follows the writer of its version; a writer follows the previous writer and all readers of the version that
+    it overwrites. A step's dependencies are in the order of its reads, then its writes, not of nodes. `versions` are
+    those of the needed steps only. A cycle of steps is an error: the one in `overwritten` for the nodes that read and
+    overwrite a texture, else RG602.
     """
-    # Readers by the kept version they see: the writers between may have been culled.
+    # Readers by the version that they see, because writers in between may have been culled.
     readers: dict[tuple[str, int], list[StepKey]] = defaultdict(list)
     for id, seen in versions.readers.items():
         known = [0, *versions.writers.get(id, ())]
@@ -180,8 +180,8 @@ def _cycles(
     overwritten: Mapping[tuple[str, str], Problem],
     steps: Mapping[StepKey, Step],
 ) -> Iterator[Problem]:
-    """Yield the problem of a cycle, then of those that are left without what that one is about."""
-    from graphlib import CycleError, TopologicalSorter  # to name a cycle where there is one
+    """Yield the problem of a cycle, then those of cycles that remain without its edges."""
+    from graphlib import CycleError, TopologicalSorter  # only to name a cycle
 
     while True:
         try:
@@ -203,9 +203,9 @@ def _overwrites(waits: Waits, edge: tuple[StepKey, StepKey]) -> bool:
 
 
 def history_copies(steps: Iterable[Step], resources: Mapping[str, Resource]) -> dict[str, int]:
-    """Return how many textures each history takes in an order of steps, by id.
+    """Return the number of textures of each history in an order of steps, by id.
 
-    Two take turns; one does if last frame's value is read for the last time before this frame's is written.
+    Usually two alternate; one suffices if last frame's value is last read before this frame's is written.
     """
     copies = {id: 1 for id, resource in resources.items() if resource.role == "history"}
     written: set[str] = set()
@@ -216,10 +216,10 @@ def history_copies(steps: Iterable[Step], resources: Mapping[str, Resource]) -> 
 
 
 class ReadFirst(Struct, frozen=True):
-    """Histories whose last value can be read before the next is written, if not every order does so by itself.
+    """Histories whose last value can be read before the next is written, unless every order does so.
 
     Attributes:
-        choices: sets of them that can be read first together; the largest first, the empty one last.
+        choices: sets that can be read first together; the largest first, the empty set last.
         exhaustive: whether these are all such sets.
     """
 
@@ -231,7 +231,7 @@ class ReadFirst(Struct, frozen=True):
 def read_first_choices(
     waits: Waits, kept: Sequence[Step], versions: Versions, resources: Mapping[str, Resource]
 ) -> ReadFirst:
-    """Return which histories can be read before they are written; of many only one large set."""
+    """Return which histories can be read before they are written; if there are many, only one large set."""
     readers: dict[str, set[StepKey]] = defaultdict(set)
     for step in kept:
         for read in step.all_reads:
@@ -263,7 +263,7 @@ def read_first_choices(
 
 
 def read_first(waits: Waits, turns: Turns) -> Waits:
-    """Return the same dependencies with the readers of some histories before the steps that write them."""
+    """Return the dependencies with the readers of some histories before the steps that write them."""
     more = dict(waits)
     for id, (writer, readers) in turns.items():
         more[writer] = {**more[writer], **dict.fromkeys(readers, (id, "overwrites"))}
@@ -279,7 +279,7 @@ def _two_writers(resource: str, one: Step, other: Step) -> Problem:
 
 
 def _unwritten(step: Step, resource: str, versions: Versions, idle: Mapping[str, str]) -> Problem:
-    """Explain why a resource is not written: its node is idle or forgot it, or the step comes too early."""
+    """Explain why a resource is not written: its node is idle or never writes it, or the step comes too early."""
     maker = resource.rpartition(".")[0]
     if maker in idle:
         text = f"node '{step.node}' reads '{resource}', but '{maker}' does nothing: {idle[maker]}"
@@ -303,7 +303,7 @@ def _loads_nothing(step: Step, resource: str) -> Problem:
 
 
 def _cycle(waits: Waits, edges: Sequence[tuple[StepKey, StepKey]], steps: Mapping[StepKey, Step]) -> Problem:
-    # An edge that only keeps a reader ahead of an overwriter is what the user can change: start the cycle there.
+    # Users can change an edge that only keeps a reader before an overwriter, so start the cycle there.
     start = next((i for i, edge in enumerate(edges) if _overwrites(waits, edge)), 0)
     one, other = edges[start]
     reader, writer = one[0], other[0]

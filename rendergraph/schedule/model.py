@@ -1,4 +1,4 @@
-"""The steps as small integers for the search, and the cost of an order."""
+"""Steps as small integers for the search, and the cost of an order."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from rendergraph.schedule.dependencies import Versions, Waits, is_filled_by_upda
 from rendergraph.steps import Resource, Step
 from rendergraph.textures import TextureDesc
 
-# Counting where a texture must live costs a visit per step and texture; long graphs count only where it is touched.
+# Exact lifetimes cost a visit per step and texture, so long graphs count only the steps that touch a texture.
 MUST_LIVE_VISITS = 20_000
 
 
 class Cost(NamedTuple):
-    """The cost of an order; the lesser of two has the smaller pool, then the lower peak.
+    """The cost of an order, compared by pool, then by peak, then by area.
 
     Attributes:
         pool: bytes of a pool of textures that are shared within a texel class.
-        peak: most live bytes at any step.
+        peak: maximum of live bytes over the steps.
         area: live bytes summed over the steps; breaks ties towards short lifetimes.
     """
 
@@ -31,14 +31,14 @@ class Cost(NamedTuple):
 
 
 class Model(Struct, frozen=True):
-    """Steps numbered in the reading order: depth first from the outputs, inputs in the order of their ports.
+    """Steps numbered in reading order: depth first from the outputs, with inputs in the order of their ports.
 
-    The numbering depends on links and port declarations alone, never on the order of nodes in a file or of keys in a
-    mapping, so neither does anything computed from it.
+    The numbering depends only on links and port declarations, not on the order of nodes in a file or of keys in a
+    mapping, and so does everything computed from it.
 
     Attributes:
-        before, after: numbers of the steps that a step waits for, and that wait for it.
-        touched: resources that a step touches, as numbers; only those that are not alive during the whole frame.
+        before, after: numbers of the steps that a step waits for, and of those that wait for it.
+        touched: numbers of the resources that a step touches, without those that are alive during the whole frame.
         born: bytes that become alive with a step.
         classes: number of the storage class of each resource; equal ones can share a texture.
         toucher_count: number of steps that touch each resource, plus one for the frame's end if it is shown.
@@ -60,7 +60,7 @@ class Model(Struct, frozen=True):
 
     @property
     def content(self) -> Hashable:
-        """All that decides the cost of an order; which steps the numbers stand for does not."""
+        """Everything that determines the cost of an order, without the identity of steps."""
         kept = self.before, self.touched, self.born, self.sizes, self.classes, self.toucher_count
         return *kept, self.shown, self.constant
 
@@ -74,10 +74,10 @@ class Model(Struct, frozen=True):
         shown: Collection[str],
         sinks: Sequence[Step],
     ) -> Model:
-        """Number the steps of a dependency graph; bytes of the whole frame are not counted yet.
+        """Number the steps of a dependency graph; `constant` is not counted yet.
 
         Args:
-            sinks: the steps the frame is rendered for, in a fixed order.
+            sinks: the steps that write the results of the frame, in a fixed order.
         """
         by_key = {step.key: step for step in kept}
         order = depth_first(waits, [step.key for step in sinks])
@@ -98,7 +98,7 @@ class Model(Struct, frozen=True):
             for id in touched_ids(step):
                 if id in whole_frame:
                     continue
-                if id not in names:  # the reading order is legal, so the first to touch is the first writer
+                if id not in names:  # the reading order is legal, so the first step that touches it is its first writer
                     names[id] = len(names)
                     toucher_count.append(0)
                     sizes.append(resources[id].bytes)
@@ -160,7 +160,7 @@ class Model(Struct, frozen=True):
         return Cost(self.constant + sum(size_of[kind] * number for kind, number in most.items()), peak, area)
 
     def peak(self, order: Sequence[int]) -> tuple[int, int | None]:
-        """Return the most live bytes of an order and the first step with that many, None without steps."""
+        """Return the peak of live bytes of an order and the first step that reaches it; None without steps."""
         left = list(self.toucher_count)
         live = peak = self.constant
         at = order[0] if order else None
@@ -175,10 +175,10 @@ class Model(Struct, frozen=True):
         return peak, at
 
     def bounds(self) -> tuple[int, int]:
-        """Return bytes that no order's pool and no order's peak can go below.
+        """Return lower bounds on the pool and the peak of any order, in bytes.
 
-        A resource is alive at a step that touches it, and at every step that must lie between its first writer and
-        another step that touches it; an output at every step that must follow its first writer.
+        A resource is alive at every step that touches it, and at every step that must run between its first writer and
+        another step that touches it; an output also at every step that must follow its first writer.
         """
         count = len(self)
         ancestors = [0] * count
@@ -212,7 +212,7 @@ class Model(Struct, frozen=True):
         size_of = dict(zip(self.classes, self.sizes, strict=True))
         at_end = [self.classes[resource] for resource in self.shown]
         pool = sum(size_of[kind] * max(*numbers, at_end.count(kind)) for kind, numbers in alive.items())
-        # A step that no other waits for runs last, while all outputs are alive.
+        # A step without dependents runs last, while all outputs are alive.
         least = sum(self.sizes[resource] for resource in self.shown) + min(
             sum(self.sizes[resource] for resource in self.touched[step] if resource not in self.shown)
             for step in range(count)
@@ -229,12 +229,12 @@ class Model(Struct, frozen=True):
 
 
 def storage_class(resource: Resource) -> object:
-    """Return a key that is equal for resources that can share a texture or buffer, perhaps through a view."""
+    """Return a key that is equal for resources that can share a texture or buffer, possibly through a view."""
     return resource.desc.storage_class if isinstance(resource.desc, TextureDesc) else resource.desc
 
 
 def alive_all_frame(resources: Mapping[str, Resource], versions: Versions) -> set[str]:
-    """Return the ids of what exists for the whole frame: history, kept values, scene data, what `update` fills."""
+    """Return the ids of resources alive all frame: history, kept values, scene data, buffers that `update` fills."""
     return {
         id
         for id, resource in resources.items()

@@ -1,4 +1,4 @@
-"""Why a step runs when it does, and why a node does not run: one sentence each."""
+"""Explain the position of each step, and why nodes do not run: one sentence each."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rendergraph.steps import Step
 
 
 def step_names(steps: Sequence[Step]) -> dict[tuple[str, int], str]:
-    """Return step key to name: the node's id, with number and label if it has several steps; of a copy its label."""
+    """Return step key to name: the node's id, with number and label if it has several steps; a copy's label."""
     several = {step.node for step in steps if step.index > 0 and step.kind != "copy"}
     names = {
         step.key: f"{step.node}[{f'{step.index} {step.label}'.rstrip()}]" if step.node in several else step.node
@@ -22,7 +22,7 @@ def step_names(steps: Sequence[Step]) -> dict[tuple[str, int], str]:
 
 
 def order_reasons(model: Model, order: Sequence[int], chosen: str | None) -> dict[tuple[str, int], str]:
-    """Return step key to why it runs when it does; `chosen` is what picked the order if not memory."""
+    """Return by step key the reason for its position; `chosen` is how the order was chosen if not by memory."""
     names = step_names(model.steps)
     place = {step: number for number, step in enumerate(order)}
     left = list(model.toucher_count)
@@ -50,7 +50,7 @@ def order_reasons(model: Model, order: Sequence[int], chosen: str | None) -> dic
         elif step == ready[0]:
             text = f"first of {waiting} that could run, reading from the outputs"
         else:
-            text = f"before {names[model.steps[ready[0]].key]}, as less memory is held this way"
+            text = f"before {names[model.steps[ready[0]].key]}, because less memory is held this way"
         reasons[model.steps[step].key] = f"{text}; {release}" if release else text
         waiting -= 1
         for other in model.after[step]:
@@ -62,10 +62,10 @@ def order_reasons(model: Model, order: Sequence[int], chosen: str | None) -> dic
 
 
 def culled_reasons(steps: Sequence[Step], kept: Sequence[Step], versions: Versions) -> Mapping[str, str]:
-    """Return node id to why none of its steps runs."""
+    """Return by node id why none of its steps runs."""
     running = {step.node for step in kept}
-    running |= {step.view.rpartition(".")[0] for step in kept if step.view}  # a node that only sets a view
-    running |= {function.node for step in kept for function in step.functions}  # or that others call
+    running |= {step.view.rpartition(".")[0] for step in kept if step.view}  # nodes that only set views
+    running |= {function.node for step in kept for function in step.functions}  # nodes whose functions are called
     culled: dict[str, str] = {}
     for node in dict.fromkeys(step.node for step in steps):
         if node in running:

@@ -1,4 +1,4 @@
-"""The least peak of live bytes: beam searches of growing width over the sets of steps that can have run."""
+"""Search for the least peak of live bytes: beam searches of growing width over the possible sets of executed steps."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from rendergraph.schedule.model import Cost, Model
 
 FIRST_WIDTH = 4
 MOST_REFINEMENTS = 32
-"""Rounds in which steps are told apart by their neighbours; twins further apart from the rest are not looked for."""
+"""Rounds of colour refinement; twins that differ from others only at a larger distance are not found."""
 
 
 def search(model: Model, *, below: int, bound: int, budget: int) -> tuple[list[int] | None, int]:
-    """Return an order of less peak than the best one known, None if none was found, and a peak that no order is below.
+    """Return an order with a lower peak than the best known, or None, and a lower bound on the peak of all orders.
 
-    States are sets of steps closed under what they wait for. A beam extends all its states by one step at a time and
-    follows only the most promising ones; each beam is four times as wide as the one before and must beat what that one
-    found. A beam that passes over nothing has seen every order that matters, so what was found is a least one. What it
-    passes over bounds what it can have missed. Two rules keep the number of states small and lose no optimum:
+    States are sets of steps closed under dependencies. A beam extends all its states by one step at a time and keeps
+    only the most promising ones; each beam is four times as wide as the previous one and must beat its result. A beam
+    that drops nothing has seen every order that matters, so its result is optimal. The states that it drops bound what
+    it can have missed. Two rules keep the number of states small without losing the optimum:
 
-    - A step that raises neither the peak nor the live bytes is run at once. Whatever order the rest takes, bringing
-      that step forward raises nothing: what it frees now is freed in every larger set as well.
+    - A step that raises neither the peak nor the live bytes runs at once. Whatever the order of the rest, moving that
+      step forward raises nothing: what it frees now is freed in every larger set as well.
     - Branches that an automorphism of the graph exchanges run in the order of their numbers (`twin_chains`).
 
     Args:
         below: peak of the best order known; states that reach it are dropped.
-        bound: a peak that no order is below; up to there everything is free.
-        budget: resources to look at before giving up; a count, so that the result does not depend on the machine.
+        bound: a lower bound on the peak; states up to it count as equal.
+        budget: resources to visit before giving up; a count, so that the result does not depend on the machine.
     """
     beams = _Beams(model, budget)
     order = None
@@ -47,11 +47,11 @@ def search(model: Model, *, below: int, bound: int, budget: int) -> tuple[list[i
 
 
 Path = tuple["Path | None", int]
-"""The way to a state: the way to the one before, and the step taken last."""
+"""The path to a state: the path to the previous state, and the last step."""
 
 
 class _Beams:
-    """Beams over one model; `budget` is the number of resources that may still be looked at."""
+    """Beams over one model; `budget` is the number of resources that may still be visited."""
 
     def __init__(self, model: Model, budget: int) -> None:
         self.budget = budget
@@ -67,11 +67,11 @@ class _Beams:
         for step, resources in enumerate(model.touched):
             for resource in resources:
                 masks[resource] |= 1 << step
-        # Per step: masks and sizes of what it touches; a resource dies with the step that completes its mask.
+        # Per step: masks and sizes of its resources; a resource's lifetime ends with the step that completes its mask.
         self._ends = [[(masks[r], model.sizes[r]) for r in resources] for resources in model.touched]
 
     def run(self, width: int, below: int, bound: int) -> tuple[tuple[list[int], int] | None, int]:
-        """Return an order below `below` with its peak, if there is one, and the least peak of the states dropped."""
+        """Return an order below `below` with its peak, if found, and the least peak of the dropped states."""
         first = tuple(step for step, needs in enumerate(self._needs) if not needs)
         level: list[tuple[int, int, int, tuple[int, ...], Path | None]] = [(bound, self._constant, 0, first, None)]
         passed_over = below
@@ -126,7 +126,7 @@ class _Beams:
 def improve(model: Model, order: Sequence[int], *, pool_bound: int, budget: int) -> tuple[list[int], Cost]:
     """Move single steps to other legal positions while that makes the order cheaper.
 
-    Stops at `pool_bound`, as no order has a smaller pool, or when the budget of touched resources is spent.
+    Stops at `pool_bound`, because no order has a smaller pool, or when the budget of visited resources is spent.
     """
     best, cost = list(order), model.cost(order)
     price = max(1, sum(model.toucher_count))
@@ -167,12 +167,12 @@ def _window(model: Model, order: Sequence[int], place: int) -> tuple[int, int]:
 
 
 def twin_chains(model: Model) -> Iterator[tuple[int, int]]:
-    """Pairs of steps of which the first may run first without loss: corresponding steps of interchangeable chains.
+    """Yield pairs of steps of which the first may run first without loss: corresponding steps of equivalent chains.
 
-    Steps are coloured by what they and their neighbours look like; a step whose colour no other has is fixed. Connected
-    steps among the others are a branch, and two branches are twins if exchanging them maps steps to steps and resources
-    to resources, which is checked. Where the branches are chains, any order becomes one in which the n-th step of a
-    branch runs before the n-th of the next, by letting the first branch that has got as far take each step.
+    Steps are coloured by their own and their neighbours' properties; a step with a unique colour is fixed. Connected
+    components of the others are branches, and two branches are twins if exchanging them is an automorphism of steps and
+    resources, which is checked. If the branches are chains, any order can be relabelled so that the n-th step of a
+    branch runs before the n-th of the next.
     """
     colours = _colours(model)
     shared: dict[int, int] = defaultdict(int)

@@ -1,4 +1,4 @@
-"""Cheap good orders: the byte-weighted post-order and the memory-delta list schedule; random and program order."""
+"""Fast heuristics for orders: byte-weighted post-order and memory-delta list schedules; random and program order."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def seeds(model: Model) -> Iterator[list[int]]:
 
 
 def post_order(model: Model) -> list[int]:
-    """Depth first from the sinks, the input that needs most and leaves least first.
+    """Return the order depth first from the sinks, where the input that needs most and leaves least comes first.
 
-    The rule of R. Sethi and J. D. Ullman ("The Generation of Optimal Code for Arithmetic Expressions", 1970) with bytes
-    in place of registers. It is optimal on trees; a step with several readers is counted for each of them.
+    This is the rule of R. Sethi and J. D. Ullman ("The Generation of Optimal Code for Arithmetic Expressions", 1970)
+    with bytes in place of registers. It is optimal on trees; a step with several readers counts for each of them.
     """
     count = len(model)
     left = model.toucher_count
-    # What a step leaves behind: resources born there that another step touches.
+    # What a step leaves: resources that it creates and that another step touches.
     leaves = [0] * count
     seen = bytearray(len(model.sizes))
     for step in range(count):
@@ -52,15 +52,15 @@ def post_order(model: Model) -> list[int]:
 
 
 def list_schedule(model: Model, *, backwards: bool = False) -> list[int]:
-    """Always run the ready step after which least is alive; backwards, choose among the steps that may come last.
+    """Always run the ready step that leaves the fewest live bytes; backwards, choose among steps that may come last.
 
-    A step's gain changes while it waits, whenever it becomes the last to touch a resource; it is then queued again.
+    A waiting step is queued again whenever it becomes the last to touch a resource, because its gain then changes.
     """
     count = len(model)
     before, after = (model.after, model.before) if backwards else (model.before, model.after)
     left = list(model.toucher_count)
     begun = bytearray(len(model.sizes))
-    if backwards:  # the frame's end comes first
+    if backwards:  # the end of the frame comes first
         for resource in model.shown:
             begun[resource] = 1
             left[resource] -= 1

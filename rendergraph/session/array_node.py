@@ -25,7 +25,7 @@ def array_type(array: npt.NDArray[Any]) -> type[Node]:
     texels = array if array.dtype == np.uint8 else array.astype(np.float32)
     texels = texels[..., None] if texels.ndim == 2 else texels
     if not 3 <= texels.ndim <= 4 or not 1 <= texels.shape[-1] <= 4 or not texels.size:
-        shape = "(height, width), or with 1 to 4 channels behind and layers before"
+        shape = "(height, width), optionally with 1 to 4 channels after them and layers before them"
         raise InputError(Problem("RG106", f"an input is an array of shape {shape}, not {array.shape}"))
     if texels.shape[-1] == 3:
         one = np.full((*texels.shape[:-1], 1), 255 if texels.dtype == np.uint8 else 1, texels.dtype)

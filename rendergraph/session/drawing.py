@@ -37,8 +37,7 @@ class Drawing(Struct, eq=False, dict=True):
     Attributes:
         runner: renders the bare frame, without scene and camera at its time and without reading back.
         times: of the frames since `begin`.
-        number: of the last rendered frame.
-        camera: of the last rendered frame.
+        number, camera: of the last rendered frame.
     """
 
     expanded: Expanded
@@ -59,7 +58,7 @@ class Drawing(Struct, eq=False, dict=True):
         self.runner = Runner(self.executable, self.expanded.linked.graph, options.reuses, options.cull)
         history = any(r.role == "history" for r in self.executable.plan.resources.values())
         self._remembers = history or self.executable.uses_previous
-        # Where things were is all that a frame then knows of earlier ones.
+        # Without a history, a frame depends only on the positions in the one before it.
         self._lead = None if history or self.runner.jittering or self.executable.reads_frame else 1
 
     def begin(self, lead: int | None = None) -> None:
@@ -76,7 +75,7 @@ class Drawing(Struct, eq=False, dict=True):
     def set(self, node: str, name: str, value: Any) -> bool:
         """Give a parameter of a node another value from the next frame on, until `begin`.
 
-        Return False, and change nothing, where it is more than a uniform of programs that run in every frame.
+        Return False, and change nothing, unless it is only a uniform of programs that run in every frame.
         """
         graph = self.expanded.linked.graph
         parameter = graph[node].type.cls.parameters().get(name) if node in graph else None
@@ -154,16 +153,16 @@ class Drawing(Struct, eq=False, dict=True):
         scene = self.expanded.linked.scene
         if not animate.moves(scene):
             return scene
-        # With `still` nothing has moved, nor may seem to.
+        # With `still`, a second update would report motion where there is none.
         if self._held is None or self.expanded.options.still is None or self._held[0] != time:
             self._held = time, animate.at(scene, time)
             self.executable.fresh |= self.scene.update(self._held[1])
         return self._held[1]
 
     def _moments(self, time: float) -> list[float]:
-        """The moments of the open shutter that are averaged in a frame, the one nearest to its own time last.
+        """Return the moments of the open shutter that a frame averages, the one nearest to its own time last.
 
-        What is no light is that of the last moment, as is what the next frame reads of this one.
+        Outputs that are not light, and what the next frame reads of this one, are those of the last moment.
         """
         options, scene = self.expanded.options, self.expanded.linked.scene
         if options.subframes == 1 or not (animate.moves(scene) or self.executable.moves_with_time):
@@ -204,7 +203,7 @@ class Drawing(Struct, eq=False, dict=True):
         )
 
     def _turned_camera(self) -> dict[str, str]:
-        """The camera of a turntable in words: the pipeline's own stands elsewhere."""
+        """Return the metadata of a turntable's camera, which is not the pipeline's own."""
         if self.expanded.options.turntable is None or self.camera is None:
             return {}
         from rendergraph.scene.camera_words import camera_words  # few cameras are put in words

@@ -29,7 +29,7 @@ def checked(graph: Graph, scene: Scene) -> list[Problem]:
         parameters = graph[node].type.cls.parameters()
         if name not in parameters or parameters[name].role != "param":
             driven = [known for known, one in parameters.items() if one.role == "param"]
-            why = "is fixed when the pipeline is compiled" if name in parameters else "is no parameter"
+            why = "is fixed when the pipeline is compiled" if name in parameters else "is not a parameter"
             problems.append(Problem("RG219", f"{what}: '{name}' {why}{suggestion(name, driven, most=9)}", curve.place))
             continue
         for value in curve.values.tolist():
@@ -54,7 +54,7 @@ class Driven:
         self._curves: list[tuple[Curve, bool, int, list[Any]]] = []
         for node, name, curve in scene.node_curves:
             if node not in graph or name not in executable.uniforms.get(node, ()):
-                continue  # what it makes is not asked for
+                continue  # its outputs are not requested
             parameter = graph[node].type.cls.parameters()[name]
             fill = int(parameter.glsl[3]) if parameter.glsl.startswith("vec") and curve.values.ndim == 1 else 0
             mismatch = executable.set_uniform(node, name, _value(curve, 0.0, parameter.type is int, fill))
@@ -73,6 +73,6 @@ class Driven:
 
 
 def _value(curve: Curve, time: float, whole: bool, fill: int) -> Any:
-    """The value of a uniform: rounded for a `whole` number, repeated to `fill` a vector."""
+    """Return the value of a uniform: rounded for a `whole` number, repeated to `fill` a vector."""
     value = curve.at(time)
     return round(value) if whole else (value,) * fill if fill else value

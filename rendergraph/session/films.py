@@ -1,4 +1,4 @@
-"""How long a film is, and what moves in it."""
+"""The length of a film, and whether anything moves in it."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ def figures_of(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, float | list
 
 
 _BLACK, _CLIPPED = 5, 254
-"""Of 255: the mean of a picture that is almost black, and a channel from which on it is clipped."""
+"""Of 255: the highest mean of a picture that is almost black, and the lowest value of a clipped channel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +170,7 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
 
     @cached_property
     def unsound(self) -> Mapping[str, Problem]:
-        """A warning for each output that holds NaN or infinity, or is of 8 bits and shows the color of NaN."""
+        """A warning for each output that holds NaN or infinity, or has 8 bits and shows the colour of NaN."""
         warnings = {}
         for name, array in self.arrays.items():
             semantic, port = self.infos[name].semantic, self.infos[name].port
@@ -237,7 +237,7 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
         low: float | None = None,
         high: float | None = None,
     ) -> Shown:
-        """Return a picture of a texture, which shows itself in a notebook: values in false colours, with their scale.
+        """Return a picture of a texture for notebooks: values in false colours, with their scale.
 
         Args:
             name: of an output or a tap: `render(taps=["sun.shadow_map"]).show("sun.shadow_map", layer=0)`.

@@ -59,7 +59,7 @@ class Gpu:
         """Free everything, the context too unless it was borrowed; only the thread that created it may do so."""
         if self._closed:
             return
-        if os.getpid() != self._process or self.device.is_released:  # all of it is the other process's, or gone
+        if os.getpid() != self._process or self.device.is_released:  # everything belongs to another process, or is gone
             self._closed = True
             return
         if threading.get_ident() != self._thread:
@@ -97,7 +97,7 @@ class Gpu:
 class _Contexts(dict[int | None, Gpu]):
     """The contexts of one thread's calls without a session, by device."""
 
-    def __del__(self) -> None:  # the thread ends: nobody else may free what belongs to it
+    def __del__(self) -> None:  # the thread ends, and no other may free its objects
         for gpu in self.values():
             with contextlib.suppress(Exception):
                 gpu.close()

@@ -42,7 +42,7 @@ class _Entry(Struct, eq=False):
 
 
 class GpuCache:
-    """Everything that a session keeps within its limits, freeing the least recently used things first; and one scene.
+    """One scene, and everything that a session caches within limits, where the least recently used is freed first.
 
     Attributes:
         kept: values that kept steps have computed.
@@ -63,7 +63,7 @@ class GpuCache:
         self.image_warnings: list[Problem] = []
         self.active: Executable | None = None
         self.drawing: object = None
-        self._entries: dict[Hashable, _Entry] = {}  # the one drawn longest ago first
+        self._entries: dict[Hashable, _Entry] = {}  # least recently used first
         self._scene: tuple[Scene, GpuScene] | None = None
 
     @property
@@ -115,7 +115,7 @@ class GpuCache:
         return key, executable
 
     def compile(self, key: Hashable, planned: Planned, scene: GpuScene) -> Executable:
-        """Compile a plan, and cache it in place of those that were used longest ago."""
+        """Compile a plan, and cache it in place of the least recently used ones."""
         self._save()
         linked, needed = planned.linked, planned.plan.memory.allocated_bytes
         types = {node.id: node.type for node in linked.graph.nodes}
@@ -137,7 +137,7 @@ class GpuCache:
 
     def release(self) -> None:
         """Free everything."""
-        self.active = None  # nobody is left to pass anything on to
+        self.active = None  # there is no later executable to pass values to
         self.clear_scene()
         self.kept.release()
         self.programs.release()
@@ -149,7 +149,7 @@ class GpuCache:
             executable.release()
         self._entries.clear()
         self.active = self.drawing = None
-        scene, self._scene = self._scene, None  # what follows may fail, and a released scene must not be met again
+        scene, self._scene = self._scene, None  # releasing may fail, and a released scene must not be used again
         if scene is not None:
             scene[1].release(self.programs)
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 PICTURES = frozenset({".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga"})
 """Extensions of pictures, which distinguish them from pipelines."""
 ENVIRONMENT_NAMES = frozenset({"none", *SHIPPED})
-"""What `--environment` takes that is no file."""
+"""Values of `--environment` that are not files."""
 _MOST_FRAMES = 10**9
 
 

@@ -20,7 +20,7 @@ def report_progress(progress: Progress | bool | None, word: str | Callable[[], s
 
     Args:
         progress: as the caller passed it.
-        word: the unit of the numbers: `frames`; or what returns it, with whatever else is to be said.
+        word: the unit of the numbers, such as `frames`; or a function that returns it, with further text.
     """
     if not isinstance(progress, bool):
         yield progress or _ignore
@@ -43,10 +43,10 @@ class Bar:
         self._word, self._longest, self._begun, self._before = word, 0, time.monotonic(), -1
 
     def __call__(self, done: int, total: int) -> None:
-        """Draw it anew."""
+        """Redraw the bar."""
         if not self._shown:
             return
-        if self._before < 0:  # what was there already took no time
+        if self._before < 0:  # work that was already done took no time
             self._begun, self._before = time.monotonic(), done
         full, word = _WIDTH * done // max(1, total), self._word() if callable(self._word) else self._word
         text = f"{'█' * full}{'·' * (_WIDTH - full)} {done} of {total} {word}"
@@ -56,7 +56,7 @@ class Bar:
         self._print(text.ljust(self._longest).encode(encoding, "replace").decode(encoding))
 
     def clear(self) -> None:
-        """Take the bar away, before something else is printed."""
+        """Erase the bar, before something else is printed."""
         if self._longest:
             self._print(" " * self._longest + "\r")
 
@@ -71,7 +71,7 @@ def _pace(done: int, left: int, seconds: float) -> str:
         return ""
     wait = left * seconds / done
     time_left = f"{wait:.0f} s" if wait < 120 else f"{wait / 60:.0f} min" if wait < 7200 else f"{wait / 3600:.1f} h"
-    return f", {done / seconds:.3g} a second, {time_left} left"
+    return f", {done / seconds:.3g} per second, {time_left} left"
 
 
 def _ignore(done: int, total: int) -> None:

@@ -1,8 +1,8 @@
-"""Values of Python as data of files: arrays, meshes, shader text and node classes in place of names.
+"""Convert Python values to data that a file can hold: arrays, meshes, shader text and node classes to names.
 
-What a file cannot hold becomes a file itself: a `.npy`, an `.npz` or a shader in a folder of this process, named by its
-content. Everything behind this module meets plain data and paths, so that selections can be pickled, and caches and
-fingerprints see content.
+A value that a file cannot hold is written to a `.npy`, `.npz` or shader file in a folder of this process, named by its
+content. The rest of the code handles only plain data and paths, so that selections can be pickled, and caches and
+fingerprints depend on the content.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Scene(dict[str, Any]):
 
 
 class Values:
-    """Python values made plain, one after the other.
+    """Converts Python values to plain data, one after the other.
 
     Attributes:
         folders: folders of files that have been written.
@@ -192,7 +192,7 @@ def _folder() -> Path:
     folder, process = Path(tempfile.mkdtemp(prefix="rendergraph-")).resolve(), os.getpid()
 
     def remove() -> None:
-        if os.getpid() == process:  # a forked process goes on without it
+        if os.getpid() == process:  # a forked process must not remove it
             shutil.rmtree(folder, ignore_errors=True)
 
     atexit.register(remove)

@@ -34,7 +34,7 @@ def scene_of(resolved: Resolved) -> Scene:
     key: tuple[Any, ...] = (Path.cwd(), spec.scene, selection.environment, selection.camera, roots, limits)
     key = (*key, selection.variant, selection.ground, selection.shutter, selection.plugins)
     key = (*key, changes and (spec.path, flow(changes)))
-    # One camera serves pictures of about one shape, such as a viewer's smaller ones.
+    # Pictures of about the same aspect ratio, such as a viewer's smaller ones, share a fitted camera.
     shape = max(math.floor(10 * spec.size[0] / spec.size[1] + 0.1), 1) / 10
     found = _IN_USE.get(key) or _IN_USE.get((*key, shape))
     if found is not None and stamps.unchanged(found.files):
@@ -69,7 +69,7 @@ def scene_limits(selection: Selection) -> SceneLimits:
 
 
 def _environment(path: Path, scene: Scene, limits: SceneLimits, extensions: Extensions) -> Environment:
-    """Return the environment that the selection has in place of the scene's own."""
+    """Return the environment with which the selection replaces the scene's own."""
     found = named(str(path), scene.lights)
     if found is not None:
         return found
@@ -79,11 +79,11 @@ def _environment(path: Path, scene: Scene, limits: SceneLimits, extensions: Exte
 
 
 def _measured(scene: Scene, limits: SceneLimits) -> Scene:
-    """Return the scene with its environment's size, which only decoding finds out of a plugin's files."""
+    """Return the scene with the size of its environment; that of a plugin's file is known only after decoding."""
     environment = scene.environment
     if environment is None or environment.size is not None or not isinstance(environment.image, ImageSource):
         return scene
-    from rendergraph.images import decode  # for such files alone
+    from rendergraph.images import decode  # only for such files
 
     height, width = decode(environment.image, srgb=True, limits=limits).shape[:2]
     return replace(scene, environment=replace(environment, size=(width, height)))

@@ -47,8 +47,8 @@ class Selection(Struct, frozen=True):
         sets: values of `-s`, such as `ao.radius=0.8`.
         patches: merge patches, as files or mappings.
         asset_roots: more folders from which files may be read.
-        limits: limits of files, by the names in messages: `yaml-depth`, `scene-vertices`, …; `plan-memory`, in MiB, is
-            that of all textures.
+        limits: limits of files, named as in messages: `yaml-depth`, `scene-vertices`, …; `plan-memory`, in MiB, limits
+            all textures.
         plugins: Python files or folders with node types.
     """
 
@@ -73,7 +73,7 @@ class Selection(Struct, frozen=True):
         if self.size is not None:
             force_setattr(self, "size", _pair(self.size))
         if self.shutter is not None and not 0 <= self.shutter <= 1:
-            raise UsageError(Problem("RG500", f"shutter: expected a share of a frame, 0 to 1, got {self.shutter}"))
+            raise UsageError(Problem("RG500", f"shutter: expected a fraction of a frame, 0 to 1, got {self.shutter}"))
         for text in self.sets:
             path, _, value = text.partition("=")
             if path.strip() in VIEW and value:
@@ -166,8 +166,8 @@ class RenderOptions(Struct, frozen=True):
             skipped steps take no time. No bit of a picture depends on it.
         cull: skip objects outside the view that they would be rendered with. No bit of a picture depends on it.
         still: a frame after which the scene, the camera and the time stay as they are, so that pictures accumulate.
-        subframes: number of moments while the camera's shutter is open, centred on the frame's, of whose light a frame
-            is the mean. Histories advance once a frame; what is random differs from moment to moment.
+        subframes: number of moments of the open shutter, centred on the frame's time, whose light is averaged. History
+            advances once per frame; random numbers differ between moments.
         turntable: the frames in which the camera goes around its target once.
         share: use kept values that other pipelines have made; by default in no test mode.
     """

@@ -73,7 +73,7 @@ def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
         subframes = picture.subframes
         view = {name: value for name, value in picture.view.items() if name not in selection.view_fields}
         if (file := view.get("environment")) is not None and str(file) not in ENVIRONMENT_NAMES:
-            # It must lie below an asset root: the user has not typed it.
+            # It must lie below an asset root, because the user has not typed it.
             Roots.of_file(Path("x"), selection.asset_roots).check(file, Place(str(selection.source)))
         selection = replace(selection, **view)
     resolve_with = partial(
@@ -134,7 +134,7 @@ def link(resolved: Resolved) -> Linked:
     spec, catalog = resolved.spec, resolved.catalog
     try:
         scene = scene_of(resolved)
-    except InputError as error:  # the file's own mistakes may be why, such as a plugin that is not installed
+    except InputError as error:  # the file's own mistakes, such as a missing plugin, may be the cause
         raise InputError([*spec.problems, *error.problems]) from None
     size = spec.tree.get("size")
     if (size is None or size.data is None) and scene.camera is not None and (aspect := scene.camera.aspect) is not None:
@@ -156,7 +156,7 @@ def link(resolved: Resolved) -> Linked:
 
 
 def sketch(resolved: Resolved) -> Linked:
-    """Return a graph for display, in which node types may be missing; `missing` has what is known of them."""
+    """Return a graph for display, in which node types may be missing; its field `missing` has the problems."""
     spec, catalog = resolved.spec, resolved.catalog
     try:
         return link(resolved)
@@ -184,7 +184,7 @@ def fitting_links(resolved: Resolved) -> dict[str, dict[str, list[str]]]:
 
 def expand(linked: Linked, options: RenderOptions = RenderOptions()) -> Expanded:
     """Record the steps of all requested outputs."""
-    if options.subframes > 1:  # they blur; nodes that imitate the shutter have nothing to do
+    if options.subframes > 1:  # subframes blur motion, so nodes must not imitate the shutter
         facts = linked.graph.facts
         facts = replace(facts, camera=replace(facts.camera, shutter=0.0))
         linked = replace(linked, graph=replace(linked.graph, facts=facts))

@@ -1,7 +1,7 @@
-"""What a node records: steps with what they read and write, and the fixed-function state they need.
+"""What a node records: steps with their reads, writes and fixed-function state.
 
-A node's `record` fills a `Steps` without GL, so what a pass does can be read, tested and scheduled with no driver.
-`Frame` is the other side: what `update` may do each frame on the CPU.
+A node's `record` fills a `Steps` without GL, so a pass can be inspected, tested and scheduled without a driver.
+`Frame` is the interface of `update`, which runs on the CPU in each frame.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ _PADDING = r"\d+x[1248]?(?:/[vi])?\Z"
 
 _Count: TypeAlias = Annotated[int, Range(1)]
 Counts: TypeAlias = Annotated[_Count | Sequence[_Count], Length(1, 3), "one to three whole numbers from 1 up"]
-"""How many along x, y and z; 1 where fewer are given."""
+"""Counts along x, y and z; missing ones are 1."""
 Macro: TypeAlias = Annotated[bool | int | float | str, "a number, True, False or text"]
 P = ParamSpec("P")
 
@@ -37,7 +37,7 @@ def check_argument(name: str, value: object, annotation: Any) -> None:
 
 
 def checked(method: Callable[P, None]) -> Callable[P, None]:
-    """Check a method's arguments first, except those that may be ports, which it checks itself, knowing the node."""
+    """Check a method's arguments before the call, except those that may be ports, which the method itself checks."""
 
     @cache
     def tested_parameters() -> tuple[list[str], dict[str, tuple[Any, Callable[[Any], bool]]]]:
@@ -66,7 +66,7 @@ def declared_port(ports: Mapping[str, Port], value: object, what: str) -> Port:
         raise Misuse(f"{what} is {quoted(value)}, not a port")
     if ports.get(value.name) is not value:
         if not value.name:
-            made = f"{what} is an {type(value).__name__} made in place; declare it as an attribute of the class"
+            made = f"{what} is an {type(value).__name__} created here; declare it as an attribute of the class"
             raise Misuse(made, "RG424")
         hint = suggestion(value.name, ports)
         raise Misuse(f"{what} is port '{value.name}' of {value.owner}, which this node does not have{hint}", "RG424")
@@ -126,7 +126,7 @@ def texels(
 
 
 def targets(ports: Mapping[str, Port], out: object) -> dict[str, Part]:
-    """Return what `out` names: the shader's name to what is written."""
+    """Return the targets of `out`, by their names in the shader."""
     if isinstance(out, Port | Part):
         part = part_of(ports, out, "out")
         found = {part.port.name: part}
@@ -136,10 +136,10 @@ def targets(ports: Mapping[str, Port], out: object) -> dict[str, Part]:
         for name in out:
             if not isinstance(name, str) or not name.isidentifier():
                 raise Misuse(f"out has the key {quoted(name)}; the keys are the shader's names")
-        given = {name: value for name, value in out.items() if value is not None or name in ports}  # others are dropped
+        given = {name: value for name, value in out.items() if value is not None or name in ports}  # None: dropped
         found = {name: part_of(ports, value, f"out[{name!r}]") for name, value in given.items()}
     else:
-        part_of(ports, out, "out")  # says what it is instead
+        part_of(ports, out, "out")  # reports what it is
         raise AssertionError
     for name, part in found.items():
         if not isinstance(part.port, WrittenPort):
@@ -188,7 +188,7 @@ def define_text(value: object) -> str:
 
 
 def counts(name: str, given: Counts) -> tuple[int, int, int]:
-    """Return up to three integers, filled up with 1."""
+    """Return three integers, padded with 1."""
     check_argument(name, given, Counts)
     x, y, z = (*(given if isinstance(given, Sequence) else (given,)), 1, 1)[:3]
     return x, y, z
@@ -199,7 +199,7 @@ def objects(value: str | Sequence[str]) -> str | tuple[str, ...]:
     if not isinstance(value, str):
         return tuple(value)
     near = nearest(value, ("all", "opaque", "transparent", "casters"))
-    if near is not None and near != value:  # a name this close to a word is given as a list
+    if near is not None and near != value:  # a name that resembles a keyword must be in a list
         raise Misuse(f"objects is '{value}'; did you mean '{near}'? An object of this name is ['{value}']")
     return value if near == value else (value,)
 
@@ -226,7 +226,7 @@ def attributes(ports: Mapping[str, Port], value: Mapping[str, Port] | None) -> d
 
 def unconnected(port: Port) -> Misuse:
     """Return the misuse of an input that is not connected."""
-    return Misuse(f"input '{port.name}' is not connected; ask `steps.connected` first")
+    return Misuse(f"input '{port.name}' is not connected; check `steps.connected` first")
 
 
 def buffer(ports: Mapping[str, Port], value: object, what: str) -> Port:
@@ -240,16 +240,16 @@ def buffer(ports: Mapping[str, Port], value: object, what: str) -> Port:
 
 
 def check_resolve(source: Port, out: Port, descs: Sequence[TextureDesc | BufferDesc | None]) -> None:
-    """Refuse what no device averages: one sample, depth, integers, unit vectors, another format or size."""
+    """Refuse resolves that devices cannot do: one sample, depth, integers, unit vectors, another format or size."""
     source_desc, out_desc = descs
     if source_desc is None:
         raise unconnected(source)
     if not (isinstance(source_desc, TextureDesc) and isinstance(out_desc, TextureDesc)):
         raise Misuse(f"'{source.name}' or '{out.name}' is a buffer; only textures have samples")
     if source_desc.samples == 1:
-        raise Misuse(f"source is '{source.name}', which has one sample per texel, so nothing to resolve")
+        raise Misuse(f"source is '{source.name}', which has one sample per texel, so there is nothing to resolve")
     texel = FORMATS[source_desc.format]
     if texel.is_depth or texel.family in ("uint", "int") or getattr(source, "semantic", None) == Normal:
         raise Misuse(f"'{source.name}' has values that cannot be averaged; choose a sample in a shader with texelFetch")
     if replace(source_desc, samples=1) != out_desc:
-        raise Misuse(f"'{out.name}' is not what '{source.name}' becomes; declare it like that input, with samples=1")
+        raise Misuse(f"'{out.name}' does not match '{source.name}'; declare it like that input, with samples=1")

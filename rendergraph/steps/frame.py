@@ -20,18 +20,18 @@ Change: TypeAlias = Literal["camera", "parameters", "size"] | SceneSource
 
 @dataclass(frozen=True, eq=False)
 class ViewMatrices:
-    """One view: column-vector matrices as float64 arrays of shape (4, 4), and the size it is rendered at.
+    """One view: column-vector matrices as float64 arrays of shape (4, 4), and the size in texels.
 
     Attributes:
         view: world to view space.
         projection: view space to clip space, z in -w…w.
         size: width and height in texels.
         near, far: distances in metres; far may be infinite.
-        light: index of the scene's light it belongs to, -1 for none.
-        span: distances from the camera, along its axis, between which the view is used; several views of one light
-            divide the picture by them, and are blended where they overlap. Everywhere by default. `range.zw` in GLSL.
-        jitter: the subpixel offset in `projection`, as fractions of the picture's width and height, if several frames
-            are accumulated (`Node.camera_jitter`). `jitter.xy` in GLSL.
+        light: index of the scene's light that it belongs to, -1 for none.
+        span: distances along the camera's axis between which the view is used, by default everywhere; several views of
+            one light (cascades) are blended where they overlap. `range.zw` in GLSL.
+        jitter: the subpixel offset in `projection`, as fractions of the picture's width and height, if frames are
+            accumulated (`Node.camera_jitter`). `jitter.xy` in GLSL.
     """
 
     view: npt.NDArray[np.float64]
@@ -54,12 +54,12 @@ class FrameScene(Protocol):
 
     @property
     def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """Minimum and maximum corner of all visible objects but shadow catchers."""
+        """Minimum and maximum corner of all visible objects except shadow catchers."""
         ...
 
     @property
     def catchers(self) -> npt.NDArray[np.int64]:
-        """Numbers of the visible shadow catchers, (n,)."""
+        """Indices of the visible shadow catchers, (n,)."""
         ...
 
     @property
@@ -69,31 +69,31 @@ class FrameScene(Protocol):
 
     @property
     def casting(self) -> npt.NDArray[np.bool_]:
-        """Which objects are visible and cast a shadow, (n,)."""
+        """Mask of objects that are visible and cast a shadow, (n,)."""
         ...
 
     @property
     def shown(self) -> npt.NDArray[np.bool_]:
-        """Which objects are not hidden, (n,)."""
+        """Mask of objects that are not hidden, (n,)."""
         ...
 
     @property
     def objects(self) -> Sequence[Any]:
         """Placed objects with `name`, `mesh`, `material`, `transform`, `casts_shadow`, `hidden`, `pose`.
 
-        `pose` is None, or has the `box` of an animated mesh and `vertices()`, its `positions` and `normals` now.
+        `pose` is None, or has the `box` of an animated mesh and `vertices()`, its current `positions` and `normals`.
         """
         ...
 
     @property
     def camera(self) -> Any:
-        """The scene's camera with `name`, `transform` and its other values; `Frame.camera` has the matrices."""
+        """The scene's camera with `name`, `transform` and other values; `Frame.camera` has the matrices."""
         ...
 
     def pixels(self, image: Any) -> npt.NDArray[np.float32]:
         """Decode an image that is the value of a `SceneKey`: (height, width, 4), top row first.
 
-        Integers become 0 to 1 as they are stored, without a transfer function; HDR and EXR files give linear light.
+        Integers are scaled to 0…1 without a transfer function; HDR and EXR files give linear light.
         """
         ...
 
@@ -101,8 +101,8 @@ class FrameScene(Protocol):
     def meshes(self) -> Sequence[Any]:
         """The meshes that an object's `mesh` indexes.
 
-        `box` is a mesh's minimum and maximum corner, `edges` the triangles that meet at each edge, `plane` the plane
-        that contains them, or None; each is computed once.
+        `box` is a mesh's minimum and maximum corner, `edges` its edge adjacency, `plane` the plane that contains it, or
+        None; each is computed once.
         """
         ...
 
@@ -113,7 +113,7 @@ class FrameScene(Protocol):
 
 
 class Frame(Protocol):
-    """What `update` can read and do.
+    """The interface of `update`.
 
     Attributes:
         index: frame number, from 1.
@@ -151,29 +151,29 @@ class Frame(Protocol):
         """Restrict the steps of a `region` to a part of the picture from now on.
 
         Args:
-            number: the region's.
+            number: number of the region.
             scissor: x, y, width and height in texels from the bottom left; None for the whole target. With a width or
                 height of 0 nothing is drawn.
-            depth_bounds: minimum and maximum of the values in the depth texture where fragments pass, 0 to 1. A driver
-                without depth bounds ignores it: it saves work, and must not change the picture.
+            depth_bounds: minimum and maximum value in the depth texture for which fragments pass, 0 to 1. Drivers
+                without depth bounds ignore it, so it may save work but must not change the picture.
         """
         ...
 
     def set_uniform(self, name: str, value: UniformValue) -> None:
         """Set a uniform of the node's steps from now on.
 
-        It must have a value before: it is a parameter, or a keyword of a step (`steps.fullscreen(…, wind=(0, 0))`). A
-        step that makes kept values keeps that value.
+        It must have an initial value: a parameter, or a keyword of a step (`steps.fullscreen(…, wind=(0, 0))`). Steps
+        that compute kept values keep the initial value.
         """
         ...
 
     def changed(self, *what: Change) -> bool:
-        """Whether something has changed since the frame before; true in the first frame.
+        """Return whether anything has changed since the previous frame; true in the first frame.
 
         Args:
-            what: `camera` (where it is and its lens, without jitter), `transforms`, `lights`, `materials`,
-                `environment`, `parameters`, `size`; all of them if nothing is given. After a change of parameters or
-                size the next frame is a first one.
+            what: `camera` (position and lens, without jitter), `transforms`, `lights`, `materials`, `environment`,
+                `parameters`, `size`; by default all of them. After a change of parameters or size, the next frame is
+                a first frame.
         """
         ...
 

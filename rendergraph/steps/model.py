@@ -1,4 +1,4 @@
-"""A step: one draw, dispatch or clear with its reads and writes; and the resources it touches."""
+"""A step: one draw, dispatch or clear with its reads and writes; and the resources that it uses."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ class Read(Struct, frozen=True, gc=False):
     Attributes:
         name: the name in the shader.
         resource: id of the resource, `node.port`.
-        version: orders readers and writers of one texture.
-        use: `sample`, `depth_test` (attached read-only), `image`, `buffer`, `attach` (the target of an `InOut`
-            whose old content stays) or `scene` (all of the scene's data).
-        mip, layer: the part read, None for all.
-        previous: last frame's value; orders nothing in this frame.
-        kind: the GLSL view of it, `texture2d` if a single mip or layer is read.
+        version: the version that is read; versions order readers and writers.
+        use: `sample`, `depth_test` (attached read-only), `image`, `buffer`, `attach` (the target of an `InOut` whose
+            old contents stay) or `scene` (all of the scene's data).
+        mip, layer: the part that is read, None for all.
+        previous: reads last frame's value, which implies no order in this frame.
+        kind: its kind in GLSL, `texture2d` if a single mip or layer is read.
     """
 
     name: str
@@ -47,15 +47,15 @@ class Read(Struct, frozen=True, gc=False):
 
 
 class Write(Struct, frozen=True, gc=False):
-    """A resource that a step writes; this creates version `version`.
+    """A resource that a step writes, creating a new version.
 
     Attributes:
         name: the name in the shader, or the port's name.
         resource: id of the resource.
         version: the version that this write creates; it continues `version - 1` if that is at least 1.
-        load: `clear` first, `load` the old content, or `discard`.
+        load: `clear` first, `load` the old contents, or `discard`.
         clear: value of every channel, or one per channel.
-        mip, layer: the part written, None for mip 0 and all layers (layered).
+        mip, layer: the part that is written, None for mip 0 and all layers (layered).
     """
 
     name: str
@@ -69,15 +69,15 @@ class Write(Struct, frozen=True, gc=False):
 
 
 class FunctionBinding(Struct, frozen=True):
-    """One provider of a function that a step's shader calls; names of its text get the provider node's prefix.
+    """One provider of a function that a step's shader calls; names in its text get the provider node's prefix.
 
     Attributes:
         signature: the function's name.
         node: the providing node's id.
         shader: the file of its text, relative to the providing node's shaders.
-        reads: what the text samples, by the names in its text.
-        defines, uniforms: the provider's own.
-        includes: parameters whose choice is a plugin's, in capitals, and the include it brings.
+        reads: textures that the text samples, by the names in its text.
+        defines, uniforms: those of the provider.
+        includes: parameters whose choice comes from a plugin, in capitals, with the plugin's include.
     """
 
     signature: str
@@ -90,11 +90,11 @@ class FunctionBinding(Struct, frozen=True):
 
 
 class Where(Struct, frozen=True, eq=False, gc=False):
-    """Where a step is written. All are equal, so that equal steps are equal wherever they come from.
+    """Where a step was recorded. All are equal, so that equal steps are equal wherever they come from.
 
     Attributes:
         place: the node's place in the pipeline's file.
-        caller: the author's file and line of the call that recorded it; None if the framework did itself.
+        caller: the author's file and line of the call that recorded it; None if the framework recorded it.
     """
 
     place: Place | None = None
@@ -113,37 +113,37 @@ class Step(Struct, frozen=True, gc=False):
     Attributes:
         node: id of the node that recorded it.
         index: its number within the node.
-        kind: a `copy` is the framework's own, of a version that is needed after it is overwritten.
+        kind: the kind; the framework adds a `copy` of a version that is needed after it is overwritten.
         shaders: stage to file name (`fragment`, `vertex`, `geometry`, `compute`), relative to the node's shaders, or
             `<name>` for one in `shaders/include/`.
         functions: providers of functions that its shader calls.
-        includes: parameters whose choice is a plugin's, in capitals, and the include it brings.
+        includes: parameters whose choice comes from a plugin, in capitals, with the plugin's include.
         defines: names and program text.
-        uniforms: names and values that belong to this step alone.
+        uniforms: names and values of this step's uniforms.
         size: width and height of the target in texels.
         samples: samples of the target.
         view: id of the view table of a geometry step.
         view_index: which view of it; None if the shader chooses by `gl_Layer`.
         objects: which objects a geometry step draws: `all`, `opaque`, `transparent`, `casters`, or names.
-        materials: what of the material its shader uses: `full`, `alpha` (only what an alpha mask needs) or `none`.
+        materials: the part of the material that its shader uses: `full`, `alpha` (for an alpha mask) or `none`.
         order: `front_to_back` (free to regroup), `back_to_front` or `scene` (unchanged).
-        in_place: whether a geometry step's triangles end up where the objects are: those outside the view are culled.
-        region: number of the node's rectangle that it is drawn in, as `update` sets it; None for the whole target.
-        if_drawn: number of the node's step without whose visible fragments the device skips this one.
-        per_light: a light's index if the step draws for one light alone.
+        in_place: whether a geometry step's triangles stay where the objects are, so that objects can be culled.
+        region: number of the node's rectangle to which `update` restricts it; None for the whole target.
+        if_drawn: number of a step of the node; if that has no visible fragments, the device skips this step.
+        per_light: a light's index if the step draws for only one light.
         vertices: vertex count of a `draw` step, or the name of the buffer that holds the indirect command.
-        command, commands: the first of the commands of that buffer, and their number; of `groups` likewise.
-        count: the name of the buffer that holds how many of the commands are drawn; empty for all.
+        command, commands: the first command in that buffer and the number of commands; likewise for `groups`.
+        count: the name of the buffer with the number of commands to draw; empty for all.
         instances: their number, or the name of the buffer that holds it.
-        object_commands: the name of the buffer with a command for each object, of a geometry step; empty without any.
-        indices: the name of the buffer that holds the indices; empty without any.
+        object_commands: for a geometry step, the name of the buffer with a command for each object, or empty.
+        indices: the name of the buffer that holds the indices, or empty.
         topology: primitives of a `draw` step; `triangles` or `triangles_adjacency` of a geometry step.
         attributes: for a `draw` step, buffer resource to attribute names with formats (`3f in_position`).
         groups: work groups of a compute step, or the name of the buffer that holds their number.
-        invocations: what a compute step covers along x, y and z, instead of `groups`.
+        invocations: number of invocations of a compute step along x, y and z, instead of `groups`.
         label: the author's name for it, or a copy's purpose; in plans and timings.
         type: the node's type.
-        where: where it is written, which is not part of its identity.
+        where: where it was recorded, which is not part of its identity.
     """
 
     node: str
@@ -188,7 +188,7 @@ class Step(Struct, frozen=True, gc=False):
         return self.relocate(Problem(code, text, subject=subject))
 
     def relocate(self, problem: Problem) -> Problem:
-        """Return a problem that was found without knowing the step, as one of the step."""
+        """Return a problem that was found without knowing the step as a problem of this step."""
         caller = self.where.caller
         line = Place(shown_file(caller[0]), caller[1], 1) if caller is not None else None
         return problem.relocate(self.where.place, context=node_named(self.node, self.type), cause=line)
@@ -215,11 +215,11 @@ SceneSource = Literal["transforms", "lights", "materials", "environment", "camer
 
 
 class Upload(Struct, frozen=True, eq=False):
-    """Values that the CPU gives a texture or buffer: an array, or a function of the scene.
+    """Values that the CPU writes to a texture or buffer: an array, or a function of the scene.
 
     Attributes:
-        sources: what of the scene the function looks at.
-        content: equal for equal values.
+        sources: the parts of the scene on which the function depends.
+        content: a key that is equal for equal values.
     """
 
     values: Any
@@ -246,13 +246,13 @@ class Resource(Struct, frozen=True, gc=False):
 
     Attributes:
         id: `node.port` of its first writer; an `InOut` continues the id.
-        desc: what it is allocated from.
+        desc: its description.
         role: `transient` and `internal` may be aliased; `output`, `history` and `kept` live the whole frame,
-            the last two from frame to frame; a `scene` resource exists already, and takes no memory here.
+            the last two from frame to frame; a `scene` resource already exists, and takes no memory here.
         first: every channel's value before the first frame, for history.
         view: id of the view table it is rendered with.
-        lights: the scene's light index of each layer.
-        note: what it consists of, where a description cannot say that.
+        lights: index of the scene's light for each layer.
+        note: its contents, if the description cannot express them.
     """
 
     id: str
@@ -265,5 +265,5 @@ class Resource(Struct, frozen=True, gc=False):
 
     @property
     def bytes(self) -> int:
-        """Bytes by formula; a history texture has two copies, and the scene's takes none of the pipeline's."""
+        """Bytes by formula; a history texture has two copies, and resources of the scene count 0."""
         return self.desc.bytes * _COPIES.get(self.role, 1)

@@ -1,4 +1,4 @@
-"""What a node calls in `record`: a list of requests, filled without GL."""
+"""The interface of `record`: a list of requests, filled without GL."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from rendergraph.typecheck import quoted
 
 
 class Recorder(Protocol):
-    """What `Steps` needs from the stage that expands a graph; node authors never use it."""
+    """The interface of `Steps` to the stage that expands a graph; node authors never use it."""
 
     @property
     def facts(self) -> Facts:
-        """What the node may ask about the graph and the scene."""
+        """Facts about the graph and the scene."""
         ...
 
     def desc(self, port: Port) -> TextureDesc | BufferDesc:
-        """Return the description that a port's texture or buffer is allocated from."""
+        """Return the description of a port's texture or buffer."""
         ...
 
     def used(self, port: Port) -> bool:
@@ -38,7 +38,7 @@ class Recorder(Protocol):
         ...
 
     def needs(self, parameter: str) -> tuple[str, ...]:
-        """Return what the choice of a parameter needs."""
+        """Return the needs of a parameter's choice."""
         ...
 
     def reads(self, out: Iterable[Part]) -> Mapping[str, Port]:
@@ -46,15 +46,15 @@ class Recorder(Protocol):
         ...
 
     def add(self, request: StepRequest) -> None:
-        """Keep a request."""
+        """Add a request."""
         ...
 
 
 class StepRequest(Struct, frozen=True, gc=False):
     """A step as the node requested it, before its ports are mapped to resources.
 
-    `caller` is the author's file and line of the call, None if the framework recorded the step itself; `reads_all`
-    says that the call names no input, so the step reads all that are connected.
+    `caller` is the author's file and line of the call, None if the framework recorded the step; `reads_all` means that
+    the call names no input, so the step reads all connected ones.
     """
 
     kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps", "resolve", "upload"]
@@ -69,7 +69,7 @@ class StepRequest(Struct, frozen=True, gc=False):
 
     @property
     def reads(self) -> Iterator[Port | Part]:
-        """The ports whose textures, buffers or functions it reads."""
+        """Yield the ports whose textures, buffers or functions it reads."""
         yield from self.bindings.values()
         yield from self.options.get("attributes", {}).values()
         for name in BUFFER_OPTIONS:
@@ -79,7 +79,7 @@ class StepRequest(Struct, frozen=True, gc=False):
 
 BUFFER_OPTIONS = ("vertices", "indices", "groups", "instances", "count", "object_commands")
 """Options of a step that may name a buffer."""
-_COMMAND_BYTES = 20  # of a draw command
+_COMMAND_BYTES = 20  # size of a draw command
 Target: TypeAlias = Port | Part
 Defines: TypeAlias = Annotated[Mapping[str, Macro], "a mapping from macros to values"]
 IN_PLACE = ("<geometry.vert>", "<depth.vert>")
@@ -88,17 +88,17 @@ Objects: TypeAlias = Annotated[str | Sequence[str], "all, opaque, transparent, c
 
 
 class Steps:
-    """The list a node fills in `record`.
+    """The list of steps that a node fills in `record`.
 
-    Textures that a step reads are given by their name in the shader (`source=self.source`); a step that names none
-    reads every connected input under its own name, except those given as None (`source=None`). Other keyword values
-    become the step's uniforms. `out` is a port, a part, or a mapping from the shader's output names; by default the
-    step writes every used output of the node. A texture with a depth format is attached as depth. In drawing steps
+    Input textures are keywords with their names in the shader (`source=self.source`); a step that names none reads
+    every connected input under its own name, except those given as None (`source=None`). Other keyword values become
+    the step's uniforms. `out` is a port, a part, or a mapping from the shader's output names; by default the step
+    writes every used output of the node. A texture with a depth format is attached as depth. In drawing steps
     `port.stored()` binds a texture as an image, and a buffer is bound as a storage block. Ports that a subclass drops
-    are None, and ignored as well. A step with a `region` number is drawn in the rectangle that `update` sets for that
-    number (`Frame.set_region`), until then everywhere. A `label` is the step's name in plans and `bench --steps`,
-    beside its node and number. A step that draws nothing where an earlier one of the node drew nothing names that one's
-    label (`if_drawn`): the device then skips it, without the CPU waiting for the answer.
+    are None and are ignored. A step with a `region` number draws in the rectangle that `update` sets for that number
+    (`Frame.set_region`), and before that everywhere. A `label` is the step's name in plans and `bench --steps`, in
+    addition to its node and number. `if_drawn` is the label of an earlier step of the node: if that step drew nothing,
+    the device skips this one, without the CPU waiting for the result.
     """
 
     def __init__(self, ports: Mapping[str, Port], node_id: str, type_name: str, recorder: Recorder) -> None:
@@ -111,7 +111,7 @@ class Steps:
 
     @property
     def facts(self) -> Facts:
-        """Viewport, lights, and what the inputs carry."""
+        """Viewport, lights, and the textures at the inputs."""
         return self._recorder.facts
 
     @property
@@ -120,21 +120,21 @@ class Steps:
         return self.facts.lights
 
     def connected(self, port: Port | None) -> bool:
-        """Whether an input is connected; False for one that the class drops."""
+        """Return whether an input is connected; False for one that the class drops."""
         return port is not None and self.facts.connected(
             checks.declared_port(self.ports, port, "connected's argument").name
         )
 
     def used(self, port: Port | None) -> bool:
-        """Whether any node reads an output; an unused one, or one that the class drops, need not be written."""
+        """Return whether any node reads an output; unused ones, and ones that the class drops, need not be written."""
         return port is not None and self._recorder.used(checks.declared_port(self.ports, port, "used's argument"))
 
     def draws(self, objects: str | Sequence[str]) -> bool:
-        """Whether a geometry step of these `objects` would draw anything in this scene: `transparent`, …, or names."""
+        """Return whether a geometry step with these `objects` would draw anything: `transparent`, …, or names."""
         return bool(self.facts.drawn(checks.objects(objects)))
 
     def needs(self, parameter: str) -> tuple[str, ...]:
-        """Return what the choice of a parameter needs, if its choices are includes."""
+        """Return the needs of a parameter's choice, if its choices are includes."""
         return self._recorder.needs(parameter)
 
     def desc(self, port: Port) -> TextureDesc:
@@ -215,23 +215,23 @@ class Steps:
             fragment: fragment shader, None for depth only.
             vertex, geometry: other stages; the default vertex shader transforms by object and view.
             out, state, region, if_drawn, defines, label, bindings: see the class.
-            view: a `Views` port, a `view` input or a texture that carries one; the node's connected `view` input, else
-                the pipeline's camera.
-            view_index: which view of it, None if a geometry shader sets `gl_Layer`.
+            view: a `Views` port, a `view` input or a texture that carries one; by default the node's connected `view`
+                input, else the pipeline's camera.
+            view_index: index of the view, None if a geometry shader sets `gl_Layer`.
             objects: `all`, `opaque`, `transparent`, `casters`, an object's name or several.
             materials: the part of the material that the shader uses.
             order: `front_to_back`, `back_to_front` or `scene`.
-            in_place: whether triangles end up where the objects are, so that objects outside of the view (with
-                `view_index=None` of all views) are culled. By default true for `<geometry.vert>` and `<depth.vert>`
-                without a geometry shader; set it for your own shaders if it holds.
+            in_place: whether triangles stay where the objects are, so that objects outside the view (with
+                `view_index=None` outside all views) are culled. By default true for `<geometry.vert>` and
+                `<depth.vert>` without a geometry shader; set it for your own shaders if it holds.
             per_light: one light's index, for a pass per light.
             topology: `triangles_adjacency` gives a geometry shader six vertices per triangle: after each corner the
                 vertex across the edge to the next one; vertices with equal positions count as one. The objects must be
                 `closed`.
-            commands: a buffer port with a draw command for every object of the scene, in its order, which an earlier
-                step has written: `DrawCommand` of `#include <scene.glsl>`. The step draws those of its `objects` whose
-                command has an instance, in the scene's order. The view culls none of them; the shader that writes the
-                commands decides.
+            commands: a buffer port with a draw command for every object of the scene, in its order, written by an
+                earlier step: `DrawCommand` of `#include <scene.glsl>`. The step draws those of its `objects` whose
+                command has an instance, in the scene's order. It culls none of them; that is up to the shader that
+                writes the commands.
         """
         if commands is not None:
             if order == "back_to_front" or topology == "triangles_adjacency":
@@ -278,15 +278,15 @@ class Steps:
         Args:
             fragment, vertex, geometry: shaders.
             vertices: a count, or a buffer port with indirect draw commands: four 32-bit integers (count, instances,
-                first, base instance) and one that is ignored; five with `indices` (count, instances, first index, base
+                first, base instance) and an ignored one; with `indices` five (count, instances, first index, base
                 vertex, base instance).
-            command, commands: the first of those commands, from 0, and their number. An earlier step may write fewer:
-                a command that is all 0 draws nothing.
-            count: a buffer port whose first 32-bit integer is how many of the `commands` are drawn. Those beyond it
-                must be all 0: a driver without `GL_ARB_indirect_parameters` draws them, too.
+            command, commands: the first command, from 0, and the number of commands. An earlier step may write
+                fewer: a command of zeros draws nothing.
+            count: a buffer port whose first 32-bit integer is the number of `commands` to draw. Commands beyond it
+                must be zeros: a driver without `GL_ARB_indirect_parameters` draws them, too.
             indices: a buffer port of 32-bit indices.
-            attributes: layout to buffer port, the layout as `3f 2f in_position in_uv`; with `/i` after the formats
-                (`4f/i in_color`) they advance per instance.
+            attributes: layout to buffer port, with layouts such as `3f 2f in_position in_uv`; with `/i` after the
+                formats (`4f/i in_color`) they advance per instance.
             topology: as in OpenGL.
             instances: a number, or a buffer port whose first 32-bit integer is the number.
             out, state, region, defines, label, bindings: see the class.
@@ -331,20 +331,19 @@ class Steps:
         label: str = "",
         **bindings: Target | UniformValue | None,
     ) -> None:
-        """Dispatch a compute shader: `out` is bound as images and buffers; barriers follow from the next readers.
+        """Dispatch a compute shader, with `out` bound as images and buffers; barriers are added automatically.
 
         Args:
             shader: the compute shader, whose `layout(local_size_x = …)` is the size of a work group.
-            over: what it covers with one invocation per texel: a texture, or this many invocations along x, y and z. By
-                default the first texture that it writes, else the first that it reads. The last work groups may reach
-                beyond
-                the edge: the shader skips those invocations.
+            over: a texture to cover with one invocation per texel, or the number of invocations along x, y and z. By
+                default the first texture that it writes, else the first that it reads. The last work groups may extend
+                beyond the edge; the shader must skip those invocations.
             groups: the number of work groups instead, or a buffer port that holds it: three 32-bit integers.
-            command: which of those triples, from 0.
+            command: index of the triple, from 0.
             out, defines, label, bindings: see the class.
         """
         if groups is not None and over is not None:
-            raise Misuse("both over and groups are given; over finds the number of groups itself")
+            raise Misuse("both over and groups are given; over determines the number of groups")
         if isinstance(groups, Port | Part):
             self._check_buffer("groups", groups, 12 * (command + 1))
         options: dict[str, Any] = {"over": over}
@@ -364,19 +363,19 @@ class Steps:
 
     @checked
     def upload(self, out: Target, values: Any, *, changes_with: Sequence[SceneSource] = (), label: str = "") -> None:
-        """Give a texture or buffer values from the CPU.
+        """Upload values from the CPU to a texture or buffer.
 
-        They are computed once, and again when a parameter of the node or something in `changes_with` has changed. They
-        are uploaded when that happens, or when the memory has been used for something else; with `kept=True` it is not.
+        They are computed once, and again when a parameter of the node or anything in `changes_with` has changed. They
+        are uploaded again after such a change, or when their memory was reused, which `kept=True` prevents.
 
         Args:
             out: a port, or a mip or layer of it.
             values: an array, or a function that takes a `FrameScene` and returns one. For a texture its shape is
-                (height, width, channels), behind the layers or the depth if there are several; axes of length 1 may be
-                left out. `values[y, x]` is what `texelFetch` reads at (x, y). Formats with 8-bit channels take bytes,
-                or floats from 0 to 1. A buffer takes an array of any shape, in its own type.
-            changes_with: what of the scene the function looks at: `transforms`, `lights`, `materials`, `environment`,
-                `camera`; values of plugins' keys belong to their entries, those of objects to `transforms`.
+                (height, width, channels), preceded by layers or depth if there are several; axes of length 1 may be
+                left out. `texelFetch` at (x, y) reads `values[y, x]`. Formats with 8-bit channels take bytes, or
+                floats from 0 to 1. A buffer takes an array of any shape, in its own type.
+            changes_with: the parts of the scene that the function uses: `transforms`, `lights`, `materials`,
+                `environment`, `camera`; plugins' keys belong to their section, those of objects to `transforms`.
             label: see the class.
         """
         part = checks.part_of(self.ports, out, "out")
@@ -385,7 +384,7 @@ class Steps:
         if desc is not None:
             checks.check_part(part, desc)
         if callable(values):
-            function = getattr(values, "__func__", values)  # that of a module that is imported again is another one
+            function = getattr(values, "__func__", values)  # a reimported module has new functions
             content = f"{id(function):#x} of {getattr(values, '__self__', None)!r}"
         else:
             values = checks.texels(part.port.name, values, desc, part.mip, part.layer)
@@ -397,19 +396,19 @@ class Steps:
         )
 
     def mipmaps(self, out: Port) -> None:
-        """Make mips 1 and up from mip 0 by 2×2 averages."""
+        """Generate mips 1 and up from mip 0 by 2×2 averages."""
         port = checks.declared_port(self.ports, out, "out")
         if isinstance(out, Part):
-            raise Misuse(f"out is a part of '{port.name}'; mips are made of a whole texture")
+            raise Misuse(f"out is a part of '{port.name}'; mips are generated for whole textures")
         desc = self._desc(port)
         if isinstance(desc, BufferDesc) or (desc is not None and desc.mips == 1):
-            raise Misuse(f"'{port.name}' has no mips to make; declare it with mips=0 for the whole chain")
+            raise Misuse(f"'{port.name}' has no mips to generate; declare it with mips=0 for the whole chain")
         self._add("mipmaps", {}, out, {}, None)
 
     def resolve(self, source: Port, out: Port) -> None:
-        """Write the mean of the samples of `source`, by the device: right for colours only.
+        """Resolve the samples of `source` to their mean on the device: correct only for colours.
 
-        A mean of depths, of unit vectors or of integers is meaningless: a shader chooses among the samples instead.
+        A mean of depths, unit vectors or integers is meaningless: use a shader that chooses a sample instead.
         """
         ports = checks.declared_port(self.ports, source, "source"), checks.declared_port(self.ports, out, "out")
         checks.check_resolve(*ports, [self._desc(port) for port in ports])
@@ -463,7 +462,7 @@ class Steps:
     def _bindings(
         self, bindings: Mapping[str, Target | UniformValue | None]
     ) -> tuple[dict[str, Target], dict[str, UniformValue]]:
-        """Split keyword arguments into what a step reads, by the shader's name, and its own uniforms."""
+        """Split keyword arguments into a step's reads, by names in the shader, and its uniforms."""
         textures: dict[str, Target] = {}
         uniforms: dict[str, UniformValue] = {}
         for name, value in bindings.items():
@@ -496,7 +495,7 @@ class Steps:
             if isinstance(desc, BufferDesc):
                 raise Misuse(f"over is the buffer '{part.port.name}'; give the number of invocations, as in over=256")
             if desc is None:
-                raise Misuse(f"over is input '{part.port.name}', which is not connected; ask `steps.connected` first")
+                raise Misuse(f"over is input '{part.port.name}', which is not connected; check `steps.connected` first")
             checks.check_part(part, desc)
             return _texels(desc, part)
         for part in (*targets.values(), *self._reads(reads)):
@@ -508,7 +507,7 @@ class Steps:
         raise Misuse("no texture determines the number of work groups; give over or groups")
 
     def _reads(self, named: Mapping[str, Target]) -> Iterator[Part]:
-        """Yield what a step reads, every input if it names none."""
+        """Yield a step's reads; every input if it names none."""
         for target in named.values() or (port for port in self.ports.values() if isinstance(port, Input | InOut)):
             part = target if isinstance(target, Part) else target.whole
             if getattr(part.port, "kind", "function") not in ("view", "function"):
@@ -516,7 +515,7 @@ class Steps:
 
 
 def _caller() -> tuple[str, int] | None:
-    """Return the author's line that requested a step; None if the framework did itself."""
+    """Return the author's line that requested a step; None if the framework requested it."""
     frame: FrameType | None = sys._getframe(1)
     while frame is not None and frame.f_globals.get("__package__") == __package__:
         frame = frame.f_back

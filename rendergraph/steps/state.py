@@ -46,7 +46,7 @@ class Blend(Struct, frozen=True):
 
     @property
     def takes_destination(self) -> bool:
-        """Whether the result depends on the target's content."""
+        """Whether the result depends on the target's contents."""
         factors = [name or "" for name in (self.src, self.dst, self.src_alpha, self.dst_alpha)]
         dst_alpha = self.dst if self.dst_alpha is None else self.dst_alpha
         return (
@@ -78,7 +78,7 @@ class StencilFace(Struct, frozen=True):
 
 
 class Stencil(Struct, frozen=True):
-    """Stencil state; `back` is the front's where None."""
+    """Stencil state; a `back` of None equals the front."""
 
     front: StencilFace = StencilFace()
     back: StencilFace | None = None
@@ -88,27 +88,27 @@ class Stencil(Struct, frozen=True):
 
 
 class State(Struct, frozen=True):
-    """The fixed function of a step.
+    """The fixed-function state of a step.
 
     Attributes:
-        depth_test: compare with the attached depth; None: yes if a depth texture is attached to a geometry or draw
-            step. Without the test every fragment's depth is written.
+        depth_test: compare with the attached depth; None: if a depth texture is attached to a geometry or draw step.
+            Without the test, every fragment's depth is written.
         depth_func: the comparison of window depth, which is reversed: `greater` is nearer.
-        depth_write: write depth; None: yes if the step writes depth.
+        depth_write: write depth; None: if the step writes depth.
         blend: one `Blend` for all targets, one per target, or None.
-        color_mask: which of RGBA are written.
-        cull: `material` culls back faces of single-sided materials; `back`, `front`, `none`; `solid` culls faces that
-            front faces hide from outside: of closed meshes with opaque, single-sided materials.
-        front: which triangles are front faces: those that run counter-clockwise on the screen, and with `object` for an
-            object whose transform mirrors it those that run clockwise, as its winding is reversed, too. A geometry
-            shader that winds its triangles itself must not use `object`.
+        color_mask: which of RGBA to write.
+        cull: `material` culls back faces of single-sided materials; `back`, `front`, `none`; `solid` culls back faces
+            of closed meshes with opaque, single-sided materials, which front faces hide from outside.
+        front: which triangles are front faces: those that are counter-clockwise on the screen; with `object`,
+            clockwise ones for objects that their transform mirrors, because that reverses the winding. A geometry
+            shader that chooses the winding itself must not use `object`.
         stencil: stencil state, None for off.
         scissor: x, y, width, height in texels from the bottom left.
         polygon_offset: factor and units of filled triangles' depth, positive for nearer; not for `wireframe` lines.
-        depth_bounds: minimum and maximum of the values in the depth texture where fragments pass. Not every driver
-            supports it: see `rendergraph doctor`; elsewhere such a step is an error.
+        depth_bounds: minimum and maximum value in the depth texture for which fragments pass. Not every driver
+            supports it (see `rendergraph doctor`); if unsupported, such a step is an error.
         depth_clamp: clamp instead of clipping at the near and far plane.
-        clip_distances: how many `gl_ClipDistance[…]` the vertex or geometry shader writes: fragments with one below 0
+        clip_distances: how many `gl_ClipDistance[…]` the vertex or geometry shader writes: fragments with any below 0
             are clipped.
         wireframe: draw lines instead of filled triangles.
     """

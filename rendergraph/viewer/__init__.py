@@ -2,9 +2,9 @@
 
     page ⇄ server (`server`, `view_state`) ⇄ render process (`render_process`, `render_service`)
 
-Edits live in the server, so they outlive a render process that a shader hangs or a driver kills. The render process
-owns the GL context and answers one request after the other. The server sends the next request when the last is
-answered, so the newest state wins and nothing queues up.
+Edits are kept in the server, so they survive if a shader hangs the render process or the driver crashes. The render
+process owns the GL context and answers one request at a time. The server sends the next request after the last
+response, so the newest state wins and nothing queues up.
 """
 
 from __future__ import annotations

@@ -12,15 +12,15 @@ from rendergraph.projection import look_at, unit
 from rendergraph.scene.geometry import vec3
 from rendergraph.scene.model import Camera, Vec3
 
-_STEEPEST = math.radians(89.0)  # at the pole left and right would change places
-_FARTHEST = 1000.0  # radii of the scene: at that distance it is a few texels
+_STEEPEST = math.radians(89.0)  # at the pole, left and right would swap
+_FARTHEST = 1000.0  # radii of the scene: at that distance it covers a few texels
 
 Sphere = tuple[Vec3, float]
 """Centre and radius around the scene."""
 
 
 def orbit(camera: Camera, sphere: Sphere, right: float, up: float) -> Camera:
-    """Turn around the target, by angles in radians: to the right, and upwards up to the pole."""
+    """Orbit the target by angles in radians: to the right, and upwards up to the pole."""
     target = _target(camera, sphere)
     arm = _eye(camera) - target
     distance = float(np.linalg.norm(arm))
@@ -32,7 +32,7 @@ def orbit(camera: Camera, sphere: Sphere, right: float, up: float) -> Camera:
 
 
 def pan(camera: Camera, sphere: Sphere, right: float, up: float) -> Camera:
-    """Move sideways together with the target, by shares of the picture's height."""
+    """Move sideways together with the target, by fractions of the picture's height."""
     target = _target(camera, sphere)
     distance = float(np.linalg.norm(_eye(camera) - target))
     height = camera.height if camera.type == "orthographic" else 2.0 * distance * math.tan(_half_angle(camera))
@@ -41,7 +41,7 @@ def pan(camera: Camera, sphere: Sphere, right: float, up: float) -> Camera:
 
 
 def zoom(camera: Camera, sphere: Sphere, factor: float) -> Camera:
-    """Move nearer to the target (`factor` below 1) or farther; an orthographic camera shows less, or more."""
+    """Move nearer to the target (`factor` below 1) or farther; an orthographic view shrinks or grows."""
     if camera.type == "orthographic":
         return replace(camera, height=_within(camera.height, factor, 1e-4 * sphere[1], sphere))
     target = _target(camera, sphere)
@@ -56,7 +56,7 @@ def _within(length: float, factor: float, least: float, sphere: Sphere) -> float
 
 
 def fly(camera: Camera, sphere: Sphere, right: float, up: float, forward: float) -> Camera:
-    """Move along the camera's axes, by shares of the scene's radius."""
+    """Move along the camera's axes, by fractions of the scene's radius."""
     target = _target(camera, sphere)
     move = camera.transform[:3, :3] @ np.array([right, up, -forward]) * sphere[1]
     return _aim(camera, _eye(camera) + move, target + move, sphere)
@@ -82,7 +82,7 @@ def _half_angle(camera: Camera) -> float:
 
 
 def _target(camera: Camera, sphere: Sphere) -> npt.NDArray[np.float64]:
-    """Return the target; without one, the point of the line of sight that is nearest to the scene's centre."""
+    """Return the target; without one, the point on the view axis closest to the scene's centre."""
     eye, forward = _eye(camera), -camera.transform[:3, 2]
     if camera.target is not None:
         target = np.array(camera.target)

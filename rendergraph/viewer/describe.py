@@ -1,4 +1,4 @@
-"""A pipeline as the page shows it: graph, parameters with their ranges and choices, plan, cameras."""
+"""Describe a pipeline for the page: graph, parameters with their ranges and choices, plan, cameras."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def describe(planned: Planned) -> dict[str, Any]:
         "parameters": parameters,
         "disabled": list(graph.disabled),
         "plan": plan_json(planned.plan),
-        "cameras": [name for name in linked.scene.cameras if not name.startswith("--")],  # without one in words
+        "cameras": [name for name in linked.scene.cameras if not name.startswith("--")],  # without one given as text
         "outputs": list(graph.outputs),
         "scene": spec.scene_name,
         "environment": str(linked.selection.environment or ""),
@@ -88,7 +88,7 @@ def _types(linked: Linked, node: GraphNode, read: Set[str], family: Sequence[str
     for name in family:
         try:
             cls = linked.catalog.get(name).cls
-        except InputError:  # a plugin's that cannot be imported
+        except InputError:  # a plugin that cannot be imported
             continue
         scene = {port for port, one in cls.inputs().items() if isinstance(one, Input) and one.takes_scene}
         needed = {port for port, one in cls.inputs().items() if not one.optional} - scene

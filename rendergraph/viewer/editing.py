@@ -1,7 +1,7 @@
-"""The file that pages edit: its text is changed in place, linked without GL, and written.
+"""The file that pages edit: its text is edited in place, linked without GL, and written.
 
-A change of the graph is an operation of `edit` on the text. Values are settings, as with `-s`, until the next such
-operation or until the file is saved: then they are written into the text, too.
+A change of the graph is an operation of `edit` on the text. Values are settings, as with `-s`, until the next operation
+or until the file is saved: then they are also written into the text.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _GROUND_KEYS = ("ground", "ground_height")
 
 
 def own_file(opened: Selection) -> Path | None:
-    """Return the file that was opened, if it is one that can be saved: neither shipped, nor a picture, nor text."""
+    """Return the file that was opened, if it can be saved: it is not shipped, a picture or YAML text."""
     source = opened.source
     if not isinstance(source, str) or "\n" in source or source in shipped_pipelines() or is_picture(source):
         return None
@@ -57,9 +57,9 @@ def text_of(opened: Selection) -> str:
 
 
 def edited(pipeline: PipelineText, sets: Iterable[str], operations: Sequence[Sequence[Any]]) -> dict[str, str]:
-    """Write settings and do operations; return the settings that stand beside the text, by path.
+    """Write settings and apply operations; return by path the settings that stay beside the text.
 
-    Those are what a change of the graph does not touch: scenes, parameters of the pipeline, parts of sub-pipelines.
+    Those are settings of scenes, parameters of the pipeline and parts of sub-pipelines.
     """
     beside: dict[str, str] = {}
     for text in sets:
@@ -67,7 +67,7 @@ def edited(pipeline: PipelineText, sets: Iterable[str], operations: Sequence[Seq
         if setting.scope or setting.node in (None, "scene"):
             path, _, value = text.partition("=")
             beside[path] = value
-        elif setting.name == "type":  # parameters and inputs that the new type lacks go, as with `-s`
+        elif setting.name == "type":  # drops parameters and inputs that the new type lacks, as with `-s`
             pipeline.retype(setting.node, str(setting.value.plain()))
         else:
             pipeline.set(f"{setting.node}.{setting.name}", setting.value.plain())
@@ -85,7 +85,7 @@ def difference(before: str, after: str, name: str) -> str:
 
 
 def problems_of(selection: Selection) -> list[dict[str, Any]]:
-    """Return what is wrong with a pipeline, as `check` says it, with the node of the edited text that each is at."""
+    """Return the problems of a pipeline, as from `check`, each with its node in the edited text."""
     try:
         stages.check(stages.link(stages.resolve(selection)))
     except RendergraphError as error:
@@ -94,7 +94,7 @@ def problems_of(selection: Selection) -> list[dict[str, Any]]:
 
 
 def node_at(problem: Problem, selection: Selection) -> str | None:
-    """Return the node that a setting names, or the one at a problem's line in the opened file; otherwise None."""
+    """Return the node that a setting names, or the one at a problem's line in the opened file, or None."""
     place = problem.place
     if place is None:
         return None
@@ -105,7 +105,7 @@ def node_at(problem: Problem, selection: Selection) -> str | None:
     try:
         text = selection.text or read_text(Path(place.file), YamlLimits(), place.file)
         nodes = (yaml_text.spans(text, ("nodes",))[-1].children or {}).items()
-    except (InputError, yaml.YAMLError):  # no nodes can be found in it
+    except (InputError, yaml.YAMLError):  # the text has no readable nodes
         return None
     above = [name for name, span in nodes if text.count("\n", 0, span.first) < place.line]
     return above[-1] if above else None
@@ -120,11 +120,11 @@ def is_in_opened(place: Place, selection: Selection) -> bool:
 
 
 def in_place(opened: Selection, selection: Selection, file: Path, text: str) -> str:
-    """Return a file's text with all changes: `run FILE` then draws what the page shows.
+    """Return a file's text with all changes, so that `run FILE` renders what the page shows.
 
     Raises:
         InputError: the selection does not link.
-        UsageError: (RG500) something of it cannot be written into the text.
+        UsageError: (RG500) some of the changes cannot be written into the text.
     """
     linked = stages.link(stages.resolve(selection))
     wanted = _without_view(linked, selection)
@@ -147,13 +147,13 @@ def in_place(opened: Selection, selection: Selection, file: Path, text: str) -> 
 
 
 def variant(opened: Selection, selection: Selection, file: Path) -> str:
-    """Return the text of a new file that extends what was opened by all changes, among them the camera.
+    """Return the text of a new file that extends the opened one with all changes, including the camera.
 
     Raises:
         InputError: the selection does not link.
     """
     if selection.text is None or own_file(opened) is None:
-        with contextlib.suppress(UsageError):  # what has no place there is written as a difference
+        with contextlib.suppress(UsageError):  # otherwise changes are written as a difference
             return in_place(opened, selection, file, selection.text or f"rendergraph: 1\nextends: {opened.source}\n")
     linked = stages.link(stages.resolve(selection))
     before = stages.resolve(replace(opened, sets=(), patches=(), scene=None, size=None)).spec.plain()
@@ -164,25 +164,25 @@ def variant(opened: Selection, selection: Selection, file: Path) -> str:
 
 
 def unlinked(opened: Selection, selection: Selection) -> str:
-    """Return the text of a file with changes that do not link, as far as it holds them."""
+    """Return the text of a file with changes that do not link, as far as possible."""
     pipeline = PipelineText(selection.text or text_of(opened), Path(opened.label), Catalog.discover(opened.plugins))
     for text in selection.sets:
         try:
             edited(pipeline, [text], ())
         except RendergraphError:
-            continue  # that may be why it does not link
+            continue  # this one may be why it does not link
     return pipeline.text
 
 
 def _without_view(linked: Linked, selection: Selection) -> dict[str, Any]:
-    """Return the resolved file with the scene's own cameras: one in words is no change of the scene."""
+    """Return the resolved file with the scene's own cameras: a camera as text does not change the scene."""
     if selection.camera is None:
         return linked.spec.plain()
     return stages.resolve(replace(selection, camera=None)).spec.plain()
 
 
 def _view_keys(chosen: Selection, linked: Linked, folder: Path) -> dict[str, Any]:
-    """Return what a scene file says of a camera that was moved, and of the surroundings of the command line."""
+    """Return keys of a scene file for a moved camera and for surroundings from the command line."""
     keys: dict[str, Any] = {}
     if chosen.camera is not None and "=" in chosen.camera:
         values = {key: list(v) if isinstance(v, tuple) else v for key, v in keys_of(chosen.camera).items()}
@@ -192,7 +192,7 @@ def _view_keys(chosen: Selection, linked: Linked, folder: Path) -> dict[str, Any
     if name == "none":
         keys["environment"] = None
     elif chosen.environment is not None:
-        own = linked.scene.recipe.get(("environment", ""), {})  # what the scene says of another file does not count
+        own = linked.scene.recipe.get(("environment", ""), {})  # the scene's keys apply to another file
         file = name if name in ENVIRONMENT_NAMES else os.path.relpath(name, folder)
         keys["environment"] = {"file": file} | {key: None for key in own if key not in ("file", *_GROUND_KEYS)}
     if chosen.ground:
@@ -213,7 +213,7 @@ def _scene_keys(linked: Linked, folder: Path) -> dict[str, Any]:
 
 
 def node_types(catalog: Catalog) -> list[dict[str, Any]]:
-    """Return every node type with what its ports take and make, for a list to choose from."""
+    """Return every node type with its ports, for a list to choose from."""
     found = []
     for name in catalog.names():
         try:

@@ -25,7 +25,7 @@ _LIST = re.compile(r"^export \{ ([\w, ]+) \};$", re.MULTILINE)
 
 
 class Exported(Struct, frozen=True):
-    """A static page, with what it shows: its picture as PNG, the description of its pipeline, size and times."""
+    """A static page with its contents: picture as PNG, description of the pipeline, size and times."""
 
     html: str
     picture: bytes
@@ -105,5 +105,5 @@ def _as_function(text: str) -> str:
 
 
 def _inline(script: str) -> str:
-    """Escape a script's text for HTML, where its `</script` would end the element."""
+    """Escape a script's text for HTML, in which `</script` would end the element."""
     return script.replace("</script", "<\\/script")

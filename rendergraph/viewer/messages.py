@@ -1,4 +1,4 @@
-"""Messages: requests of the server to the render process, which travel through a pipe, and those of a page."""
+"""Messages: requests of the server to the render process, sent through a pipe, and those of a page."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rendergraph.session.selection import Selection
 
 @dataclass(frozen=True)
 class Look:
-    """How a texture is shown: one channel or all, and a mapping of a range; by default as suits what it means."""
+    """How a texture is shown: one channel or all, and the mapping of a range; by default as its semantic suggests."""
 
     channel: str = ""
     scale: str = ""
@@ -26,9 +26,9 @@ class Look:
 
 @dataclass(frozen=True)
 class RenderRequest:
-    """A picture of a pipeline with all edits: an output or tap, by a camera that was moved or the scene's own.
+    """A picture of a pipeline with all edits: an output or tap, from a moved camera or the scene's own.
 
-    A still one is of full size, lossless and with statistics; others are as fast as possible.
+    A still picture has full size, no loss and statistics; others are as fast as possible.
     """
 
     selection: Selection
@@ -44,7 +44,7 @@ class RenderRequest:
 
 @dataclass(frozen=True)
 class ThumbnailRequest:
-    """A small picture of the first texture of each of these nodes, as the last frame has it; None for every port."""
+    """A small picture of the first texture of each of these nodes in the last frame; None for every port."""
 
     nodes: frozenset[str] | None = None
 
@@ -74,7 +74,7 @@ Request = RenderRequest | ThumbnailRequest | PixelRequest | CompareRequest | Cha
 
 @dataclass(frozen=True)
 class Response:
-    """The response: JSON values, encoded pictures, problems with their node; camera and scene's sphere of a picture."""
+    """A response: JSON values, encoded pictures, problems with their node; camera and bounding sphere of a picture."""
 
     facts: dict[str, Any] = field(default_factory=dict)
     files: Mapping[str, bytes] = field(default_factory=dict)
@@ -86,7 +86,7 @@ class Response:
 # --- what a page sends to the server, as JSON -------------------------------------------------------------------------
 
 LONGEST_VALUE = 20_000
-"""Characters of a value."""
+"""Maximum length of a value."""
 _NAME = re.compile("[A-Za-z_][A-Za-z0-9_-]*")
 
 
@@ -97,7 +97,7 @@ class PageMessage(Struct, frozen=True, tag_field="do", tag=lambda name: name.rem
 class SetMessage(PageMessage, frozen=True):
     path: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_/-]+(\.[A-Za-z0-9_]+)?\Z")]
     value: Any
-    again: bool = False  # continues the last change, as of a slider that is still held
+    again: bool = False  # continues the last change, such as a slider being dragged
 
     def __post_init__(self) -> None:
         if len(repr(self.value)) > LONGEST_VALUE:
@@ -122,7 +122,7 @@ class RedoMessage(PageMessage, frozen=True):
 
 
 class CameraMessage(PageMessage, frozen=True):
-    """Choose a camera by name, or move the current one by angles, shares of the picture or scene, or a factor."""
+    """Choose a camera by name, or move the current one by angles, fractions of picture or scene, or a factor."""
 
     name: str | UnsetType | None = UNSET
     orbit: tuple[float, float] | None = None
@@ -142,7 +142,7 @@ class LookMessage(PageMessage, frozen=True):
 
 
 class ViewMessage(PageMessage, frozen=True):
-    """Look through a named view of the file."""
+    """Show a named view of the file."""
 
     name: str
 
@@ -154,7 +154,7 @@ class KeepViewMessage(PageMessage, frozen=True, tag="keep_view"):
 
 
 class VisibleMessage(PageMessage, frozen=True):
-    """The nodes of the graph that a page has in sight."""
+    """The nodes of the graph that are visible on a page."""
 
     nodes: Annotated[list[str], Meta(max_length=2000)]
 
@@ -185,7 +185,7 @@ class PixelMessage(PageMessage, frozen=True):
 
 
 class EditMessage(PageMessage, frozen=True):
-    """Operations on the graph, as `rendergraph edit` has them: together one step of undo."""
+    """Operations on the graph, as in `rendergraph edit`; together they are one undo step."""
 
     operations: Annotated[list[list[Any]], Meta(min_length=1, max_length=16)]
 
@@ -193,7 +193,7 @@ class EditMessage(PageMessage, frozen=True):
         for name, *words in (operation or [""] for operation in self.operations):
             kinds = OPERATIONS.get(name) if isinstance(name, str) else None
             if kinds is None or len(words) != len(kinds) or not all(map(isinstance, words, kinds)):
-                raise ValueError(f"'{name}' is no operation with these words")
+                raise ValueError(f"'{name}' is not an operation with these arguments")
             if len(repr(words)) > LONGEST_VALUE:
                 raise ValueError("the operation is too long")
             if name in ("add", "retype", "insert") and not _NAME.fullmatch(words[1]):  # no page may name a file
@@ -212,29 +212,29 @@ OPERATIONS: Mapping[str, tuple[type, ...]] = {
     "insert": (str, str, str),
     "duplicate": (str, str),
 }
-"""Methods of `PipelineText` that a page may call, with the types of their words."""
+"""Methods of `PipelineText` that a page may call, with the types of their arguments."""
 
 
 class ReloadMessage(PageMessage, frozen=True):
-    """Take the file as it is on the disk in place of the changes to it."""
+    """Reload the file from disk, discarding the changes to it."""
 
     pass
 
 
 class TypesMessage(PageMessage, frozen=True):
-    """Ask for the node types that can be added."""
+    """Request the node types that can be added."""
 
     pass
 
 
 class DraftMessage(PageMessage, frozen=True):
-    """Ask what saving would write, under a name or to the edited file."""
+    """Request what saving would write, under a name or to the edited file."""
 
     name: Any = None
 
 
 class SaveMessage(PageMessage, frozen=True):
-    """Save under a name; of the opened file itself, what its `digest` was in the draft that was shown."""
+    """Save under a name; for the opened file itself, `digest` is that of the draft that was shown."""
 
     name: Any
     digest: str = ""

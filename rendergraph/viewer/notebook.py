@@ -19,9 +19,9 @@ EXTRA = ("the viewer", "view", "starlette", "uvicorn", "websockets")
 class Viewer:
     """A page that is served until `close`, or until Python ends.
 
-    In a notebook it shows itself; elsewhere open `url` in a browser: whoever has it may use the page. It has a render
-    process of its own, which shares nothing with a `Session` of this process. Changes that were not saved on the page
-    are written to `NAME-unsaved.yaml` in the end.
+    In a notebook it is displayed; elsewhere open `url` in a browser. Anyone who has the address can use the page. It
+    has its own render process, which shares nothing with a `Session` of this process. Unsaved changes on the page are
+    written to `NAME-unsaved.yaml` at the end.
     """
 
     def __init__(self, url: str, stop: Callable[[], None], keep: Callable[[], Path | None], height: int) -> None:
@@ -32,7 +32,7 @@ class Viewer:
         atexit.register(keep)
 
     def close(self) -> Path | None:
-        """End the server and its render process, and return the file of changes that were not saved, if any."""
+        """End the server and its render process, and return the file of unsaved changes, if any."""
         if self._stop is None:
             return None
         self._stop()
@@ -67,9 +67,9 @@ def view(
     Args:
         pipeline: a pipeline, a shipped name, a file.
         against: the pipeline to compare with.
-        port: of the page's address; any that is free by default.
+        port: port of the page's address; by default any free one.
         device: GL device number.
-        height: of the frame in a notebook, in pixels.
+        height: height of the frame in a notebook, in pixels.
 
     Raises:
         UsageError: the extra `view` is not installed, or the port is in use.

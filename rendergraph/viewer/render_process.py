@@ -1,7 +1,7 @@
-"""The render process, as the server sees it: started, asked, ended when it does not answer, and started again.
+"""The server's interface to the render process: start it, ask it, terminate it if it hangs, and restart it.
 
-A shader that hangs, a driver that crashes or a size that memory does not hold ends this process and nothing else: the
-server reports what happened and keeps the edits, and the next request starts another process.
+A hanging shader, a crashing driver or a lack of memory ends only this process: the server reports what happened and
+keeps the edits, and the next request starts another process.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ TIMEOUT = 30.0
 """Seconds that a request may take; the first one of a process may take longer."""
 
 FIRST_TIMEOUT = 120.0
-"""Seconds that the first request of a process may take, at least: it also imports, opens the device, and compiles."""
+"""Minimum timeout for the first request of a process, which also imports, opens the device and compiles."""
 
 
 class RenderProcess:
-    """A process that answers requests, one at a time. Any one thread at a time may use it."""
+    """A process that answers requests, one at a time. Only one thread at a time may use it."""
 
     def __init__(self, device: int | None = None, timeout: float = TIMEOUT) -> None:
         self._device, self._timeout = device, timeout
@@ -40,13 +40,13 @@ class RenderProcess:
     def ask(self, request: Request) -> Response:
         """Return the response to a request.
 
-        A RenderError says that the process took too long or died; the next request starts another one.
+        A RenderError reports that the process took too long or died; the next request starts another one.
         """
         with self._lock:
             child = self._running()
             patience = self._timeout if child.has_answered else max(self._timeout, FIRST_TIMEOUT)
             try:
-                with contextlib.suppress(OSError):  # receiving finds out why
+                with contextlib.suppress(OSError):  # receiving reports the reason
                     child.pipe.send(request)
                 response = child.receive(patience)
             except TimeoutError:
@@ -63,7 +63,7 @@ class RenderProcess:
 
     def close(self) -> None:
         if (child := self._child) is not None:
-            child.process.kill()  # a thread that waits for its answer has the lock, and now hears of the end
+            child.process.kill()  # a thread that waits for its response has the lock, and gets an error now
         with self._lock:
             self._end()
 

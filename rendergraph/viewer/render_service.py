@@ -1,4 +1,4 @@
-"""What runs in the render process: pictures, and facts about them."""
+"""The service in the render process: renders pictures and computes facts about them."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ from rendergraph.viewer.messages import Look, RenderRequest, Request, Response
 Pixels = npt.NDArray[Any]
 
 NO_ALIAS_BYTES = 256 << 20
-"""Textures up to this size do not share memory, so that more of the last frame is left when something changes."""
+"""Up to this size textures do not share memory, so that more of the last frame can be reused after a change."""
 INTERACTIVE_MS = 40.0
-"""A moving picture that takes longer is rendered smaller."""
+"""Moving pictures that take longer are rendered smaller."""
 MOST_REDUCTION = 4
-"""It is rendered at a quarter of its size at the least."""
+"""Minimum scale of moving pictures: a quarter of the size."""
 THUMBNAIL = 176
 """Pixels along the longer side of a small picture."""
 BINS = 64
@@ -49,7 +49,7 @@ _LIGHT = frozenset({"radiance", "emissive", "luminance", "irradiance", "reflecti
 
 @dataclass(frozen=True)
 class _Rendered:
-    """The last picture, and which output or tap of it is shown."""
+    """The last picture, and the output or tap that is shown."""
 
     request: RenderRequest
     frame: Frame
@@ -68,7 +68,7 @@ class _Rendered:
         return self.displayed()[0]
 
     def displayed(self) -> tuple[npt.NDArray[np.uint8], str]:
-        """The picture, and how values become colours, if that was chosen."""
+        """Return the picture, and the mapping of values to colours, if one was chosen."""
         look, pixels = self.request.look, _expose(self.pixels, self.info, self.request.exposure)
         if look == Look():
             return images.viewable_as(pixels, self.info), ""
@@ -80,9 +80,9 @@ class _Rendered:
 
 
 class RenderService:
-    """Answers requests in the render process; one that cannot be answered is answered with its problems.
+    """Answers requests in the render process; the response to a failed request has its problems.
 
-    It owns the GL context, and keeps what the next picture can use: linked pipelines, their steps, the last picture.
+    It owns the GL context, and caches what the next picture can use: linked pipelines, their steps, the last picture.
     """
 
     def __init__(self, gpu: Gpu, interactive_ms: float = INTERACTIVE_MS) -> None:
@@ -94,14 +94,14 @@ class RenderService:
         self._revision = 0
         self._described: dict[str, Any] = {}
         self._node_of_file: Mapping[str, str] = {}
-        self._full_ms = 0.0  # the time of a whole frame, from the last time that each node ran
+        self._full_ms = 0.0  # the time of a whole frame: the sum of each node's last time
         self._timed: Executable | None = None
         self._pass_times: dict[str, dict[str, Any]] = {}
         self._rendered: _Rendered | None = None
-        self._has_slid = False  # the last drawing has another value than its pipeline says
+        self._has_slid = False  # a value in the last drawing differs from its pipeline
 
     def answer(self, request: Request) -> Response:
-        """Return the response; mistakes of the user are in it, not raised."""
+        """Return the response; it contains mistakes of the user instead of raising them."""
         try:
             return self._answer(request)
         except RendergraphError as error:
@@ -127,7 +127,7 @@ class RenderService:
                 self._files = {**self._files, **files}
         self._rendered, frame = rendered, rendered.frame
         picture, mapping = rendered.displayed()
-        warnings = tuple(one for one in frame.warnings if one.code != "RG620")  # the page can play
+        warnings = tuple(one for one in frame.warnings if one.code != "RG620")  # the page can play frames
         if request.still:
             drawing = rendered.drawing
             warnings += tuple(stages.not_finite_warnings(frame, drawing.expanded, self._gpu, drawing.camera))
@@ -157,9 +157,9 @@ class RenderService:
     def _passes(self, rendered: _Rendered) -> list[dict[str, Any]]:
         """Return each node's last times, whether it ran for this picture, and whether that was its first time.
 
-        The first time of a program contains what the driver does late. Smaller pictures leave no times behind.
+        The first time of a program includes deferred work of the driver. Smaller pictures are not timed.
         """
-        assert self._planned is not None  # the picture is of it
+        assert self._planned is not None  # the picture was rendered with it
         is_first = self._timed is not rendered.drawing.executable
         ran = {step.node for step in rendered.frame.times[-1].steps if step.index >= 0}
         drawn = [step.node for step in self._planned.plan.schedule.steps]
@@ -170,7 +170,7 @@ class RenderService:
                 times[node] = dict(entry) | {"first": is_first}
         if rendered.request.still:
             self._timed, self._pass_times = rendered.drawing.executable, times
-            kept = {step.node for step in rendered.drawing.executable.kept.values()}  # these do not run again
+            kept = {step.node for step in rendered.drawing.executable.kept.values()}  # kept steps do not run again
             again = (entry for node, entry in times.items() if node not in kept)
             self._full_ms = sum(entry["gpu_ms"] or entry["cpu_ms"] for entry in again)
         return [entry | {"ran": node in ran} for node, entry in times.items()]
@@ -185,15 +185,15 @@ class RenderService:
                 self._planned = stages.plan(stages.expand(linked))
                 self._node_of_file = _nodes_by_file(self._planned)
                 described = describe(self._planned)
-                if described != self._described:  # not only the camera
+                if described != self._described:  # more than the camera has changed
                     self._described = described
                     self._revision += 1
-        if not request.still:  # its description waits until it is still
+        if not request.still:  # the description waits for a still picture
             selection = self._reduce_size(selection, self._planned.linked.graph.size)
         return self._draw(self._expand(selection, request), request)
 
     def _slide(self, request: RenderRequest) -> _Rendered | None:
-        """Draw the last moving picture with another value of one parameter, if that needs no linking."""
+        """Render the last moving picture with another value of one parameter, if that needs no linking."""
         last = self._rendered
         if last is None or last.request.still or request.still or request.port != last.request.port:
             return None
@@ -237,7 +237,7 @@ class RenderService:
             linked = self._link(selection)
             outputs = linked.graph.outputs
             main = "image" if "image" in outputs else next(iter(outputs))
-            assert self._planned is not None  # the first picture is still, and that is planned
+            assert self._planned is not None  # the first picture is still, and so planned
             alias = self._planned.plan.memory.no_reuse_bytes > NO_ALIAS_BYTES
             shown = port if port in outputs else main
             options = RenderOptions(
@@ -296,11 +296,11 @@ class RenderService:
         return Response({"revision": self._revision}, files)
 
     def _first_texture(self, node: str, ports: Collection[str]) -> str | None:
-        """Return the first of a node's outputs that is a texture, and that was drawn."""
-        assert self._planned is not None  # its ports are asked for
+        """Return the first output of a node that is a texture and was rendered."""
+        assert self._planned is not None  # its ports were requested
         graph = self._planned.linked.graph
         if node not in graph:
-            return None  # it was there when the page asked
+            return None  # it existed when the page asked
         outputs = (f"{node}.{name}" for name in graph[node].node.outputs())
         textures = {str(end) for end, info in graph.textures.items() if isinstance(info.desc, TextureDesc)}
         return next((port for port in outputs if port in ports and port in textures), None)
@@ -368,7 +368,7 @@ def _expose(pixels: Pixels, info: OutputInfo, exposure: float) -> Pixels:
 
 
 def _subsample(picture: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    """Return every n-th pixel of what is larger than a thumbnail: shadow maps, cubes."""
+    """Return every n-th pixel of a picture that is larger than a thumbnail: shadow maps, cubes."""
     step = math.ceil(max(picture.shape[:2]) / THUMBNAIL)
     return np.ascontiguousarray(picture[::step, ::step])
 

@@ -1,8 +1,8 @@
-"""The server: one page, one WebSocket, and who may use them.
+"""The server: one page, one WebSocket, and access control.
 
 It is bound to this machine, with a token in the address. Every request and socket must name the right host, and come
-from one of our pages (or from no page), so that no other web page can drive it, not even by DNS rebinding. Only a fixed
-table of our own files can be fetched: no path that a client sends is ever opened.
+from one of our pages (or from no page), so that no other web page can control it, not even by DNS rebinding. Only a
+fixed table of our own files can be fetched: a path that a client sends is never opened.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from rendergraph.viewer.view_state import ViewState
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 WATCH_SECONDS = 0.25
-"""Between two checks of the input files."""
+"""Seconds between two checks of the input files."""
 _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".md": "text/plain"}
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
@@ -58,7 +58,7 @@ _HEADERS = {
 
 @dataclass(frozen=True)
 class ServerLimits:
-    """What clients may take; dragging on a page sends some sixty messages per second."""
+    """Limits for clients; dragging on a page sends about sixty messages per second."""
 
     message_bytes: int = 65_536
     messages_per_second: float = 400
@@ -75,7 +75,7 @@ def page_files() -> Mapping[str, bytes]:
 
 @dataclass(eq=False)
 class Page:
-    """One tab. Only the newest message of each kind waits, so a slow page delays no other and fills no memory."""
+    """One tab. Only the newest message of each kind waits, so a slow page neither delays others nor fills memory."""
 
     socket: WebSocket
     waiting: dict[str, bytes | str] = field(default_factory=dict)
@@ -120,12 +120,12 @@ class Server:
         port: int = 0,
         limits: ServerLimits = ServerLimits(),
     ) -> None:
-        """Bind the address, where port 0 is any that is free; nothing is served yet."""
+        """Bind the address, where port 0 is any free one; nothing is served yet."""
         self._state, self._process, self._limits = state, process, limits
         self._pages: set[Page] = set()
         self._wake = asyncio.Event()
         self._needs_picture = True
-        self._revision = 0  # of what is to be drawn: it counts the pictures that were asked for
+        self._revision = 0  # counts the requested pictures
         self._shown = 0  # the revision of the picture that pages have
         self._details_of: RenderRequest | None = None  # a still picture whose comparison and thumbnails are missing
         self._has_problems = False  # the last picture failed, and pages know
@@ -134,7 +134,7 @@ class Server:
         self._thumbnails: dict[str, bytes] = {}
         self._still: RenderRequest | None = None  # the last still picture
         self._judging: asyncio.Task[None] | None = None
-        self._last: dict[str, bytes | str] = {}  # by kind, for pages that come later
+        self._last: dict[str, bytes | str] = {}  # by kind, for pages that connect later
         self._queries: dict[tuple[Page, type], tuple[Request, Callable[[Response], None]]] = {}
         self._socket = _bind(host, port)
         port = self._socket.getsockname()[1]
@@ -284,7 +284,7 @@ class Server:
         return self._state.as_json() | {"revision": self._revision}
 
     def _judge_soon(self) -> None:
-        """Say what is wrong with an edit at once, also while a picture is being drawn."""
+        """Report mistakes in an edit immediately, even while a picture is being rendered."""
         if self._judging is None or self._judging.done():
             self._judging = asyncio.create_task(self._judge())
 
@@ -297,7 +297,7 @@ class Server:
             self._show_problems(problems)
 
     def _query(self, page: Page, request: Request, then: Callable[[Response], None]) -> None:
-        """Ask for something beside pictures; of one page and kind only the last request counts."""
+        """Request something besides pictures; only the last request of each page and kind counts."""
         self._queries.pop((page, type(request)), None)
         self._queries[page, type(request)] = request, then
         self._wake.set()
@@ -325,7 +325,7 @@ class Server:
                 if self._pages and await self._files_changed():
                     self._thumbnails_of = None
                     self._request_picture()
-                self._send_state()  # the edited file may have changed on the disk
+                self._send_state()  # the edited file may have changed on disk
                 continue
             self._wake.clear()
             while self._queries:
@@ -339,7 +339,7 @@ class Server:
                 await self._render_details(self._details_of)
 
     async def _render(self) -> None:
-        """Show the current picture; after one that fails nothing is requested until something changes."""
+        """Show the current picture; after a failure nothing is requested until something changes."""
         begun, request, revision = time.monotonic(), self._state.request(), self._revision
         response = await self._ask(request)
         if response is None or response.problems:
@@ -359,7 +359,7 @@ class Server:
         facts = dict(response.facts)
         if (pipeline := facts.pop("pipeline", None)) is not None:
             self._broadcast("pipeline", pipeline | {"revision": self._shown})
-        if self._has_problems and request.selection == self._state.selection:  # or they are of a newer edit
+        if self._has_problems and request.selection == self._state.selection:  # otherwise they belong to a newer edit
             self._show_problems([])
         self._broadcast("picture", facts | {"frame": request.frame, "revision": self._shown}, response.files)
 
@@ -388,7 +388,7 @@ class Server:
         self._details_of = None
 
     def _send_thumbnails(self, response: Response) -> None:
-        """Send what is new to the pages; one that comes later gets all."""
+        """Send new thumbnails to the pages; a page that connects later gets all."""
         new = {name: data for name, data in response.files.items() if self._thumbnails.get(name) != data}
         self._thumbnails |= new
         if new:
@@ -406,7 +406,7 @@ class Server:
         return response is not None and bool(response.facts.get("changed"))
 
     async def _ask(self, request: Request) -> Response | None:
-        """Return the response of the render process; None where it was lost, which pages are told."""
+        """Return the response of the render process; None if the process was lost, which is reported to pages."""
         try:
             response = await asyncio.to_thread(self._process.ask, request)
         except RendergraphError as error:
@@ -419,7 +419,7 @@ class Server:
 
 
 class _SlowRequestGuard(H11Protocol):
-    """Closes a connection that sends no request in time: it would hold a place for ever."""
+    """Closes a connection that sends no request in time, because it would block a slot forever."""
 
     request_seconds: float
 
@@ -463,13 +463,13 @@ class _Guard:
 
 
 def _bind(host: str, port: int) -> socket.socket:
-    # Only where the protocol is named does asyncio send at once (TCP_NODELAY); else messages wait 40 ms.
+    # asyncio sets TCP_NODELAY only if the protocol is named; otherwise messages wait 40 ms.
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     bound = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     try:
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         bound.bind((host, port))
-        bound.listen(128)  # a browser may come before the server runs, and waits
+        bound.listen(128)  # a browser that connects before the server runs must wait
     except OSError as error:
         bound.close()
         text = f"'{host}' port {port} is not available: {error.strerror or error}; choose another with --port"

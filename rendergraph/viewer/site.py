@@ -38,6 +38,6 @@ def _card(name: str, page: Exported) -> str:
     software = " (software rasteriser)" if facts["device"]["software"] else ""
     return (
         f'<li><a href="{name}.html"><img src="{name}.png" width="{width}" height="{height}" '
-        f'alt="What {name} draws">\n<h2>{name}</h2>\n'
+        f'alt="Picture of {name}">\n<h2>{name}</h2>\n'
         f'<p>{escape(str(pipeline["description"]))}</p>\n<p class="quiet">{cost}{software}</p></a></li>'
     )

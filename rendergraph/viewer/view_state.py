@@ -1,7 +1,7 @@
-"""The state that all pages share: what is shown, what was edited, and what it is compared with.
+"""The state that all pages share: the shown picture, the edits, and the pipeline to compare with.
 
-`ViewState.apply` takes a message of a page, `request` returns the picture to ask for, and `record` takes the response.
-None of them waits for anything.
+`ViewState.apply` handles a message of a page, `request` returns the picture to request, and `record` takes the
+response. None of them blocks.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ from rendergraph.viewer.messages import RenderRequest, Response
 
 MOST_UNDO = 500
 MOST_COMPARED = 50
-"""Snapshots and pipelines that are kept to compare with."""
+"""Maximum number of snapshots and pipelines to compare with."""
 CAMERA = "camera"
-"""The path of the camera among the edits: a name, or words as `--camera` takes them."""
+"""The path of the camera among the edits: a name, or text as for `--camera`."""
 ENVIRONMENT = "environment"
 FRAME = "frame"
-"""The path of the frame among the edits, which is no setting."""
+"""The path of the frame among the edits, which is not a setting."""
 _FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.ya?ml")
 _BARE = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")  # a word that needs no quotes in YAML
 _KEYWORDS = frozenset({"null", "true", "false", "Null", "NULL", "True", "TRUE", "False", "FALSE"})
@@ -49,11 +49,11 @@ _State = tuple[str | None, Mapping[str, str]]
 
 @dataclass(frozen=True)
 class Edits:
-    """What was changed, with undo and redo.
+    """The changes, with undo and redo.
 
     Attributes:
         current: settings by path (`ao.radius`, `shadows.type`, `light.occlusion`, `camera`), in order.
-        text: the file after changes of its graph; None is the file on the disk.
+        text: the file after changes of its graph; None stands for the file on disk.
     """
 
     current: Mapping[str, str] = field(default_factory=dict)
@@ -70,7 +70,7 @@ class Edits:
         return self.text, self.current
 
     def set(self, path: str, value: Any, *, again: bool = False) -> Edits:
-        """Set a value; `again` continues the last change (a slider that is still held) instead of adding one."""
+        """Set a value; `again` continues the last change (a slider being dragged) instead of adding one."""
         bare = isinstance(value, str) and _BARE.fullmatch(value) and value not in _KEYWORDS
         text = value if bare or path == CAMERA else json.dumps(value)
         if self.current.get(path) == text:
@@ -81,7 +81,7 @@ class Edits:
         return self.write(self.text, current)
 
     def differs_by(self, path: str) -> bool:
-        """Whether the last change was of this path alone."""
+        """Return whether the last change was only of this path."""
         if not self.before:
             return False
         text, before = self.before[-1]
@@ -109,7 +109,7 @@ class Edits:
         return Edits(current, text, (*self.before, self.state), self.after[:-1])
 
     def save(self, before: str, after: str, current: Mapping[str, str]) -> Edits:
-        """Take note that the file was written: states that were changes to it are changes to what it was."""
+        """Record that the file was written: undo states become changes relative to its former text."""
 
         def kept(states: tuple[_State, ...]) -> tuple[_State, ...]:
             return tuple((before if text is None else text, settings) for text, settings in states)
@@ -123,9 +123,9 @@ class ViewState:
     """The state of the pages.
 
     Attributes:
-        camera: while it is being moved; a drag that has ended is an edit.
-        held: while something is dragged.
-        revision: of the description that pages have.
+        camera: the camera while it is being moved; a finished drag is an edit.
+        held: whether something is being dragged.
+        revision: revision of the description that pages have.
     """
 
     opened: Selection
@@ -143,13 +143,13 @@ class ViewState:
     revision: int = 0
 
     def __post_init__(self) -> None:
-        self._last_camera: Camera | None = None  # of the last picture
+        self._last_camera: Camera | None = None  # camera of the last picture
         self._sphere: cameras.Sphere = ((0.0, 0.0, 0.0), 1.0)
         self._others: dict[str, Selection] = {"as opened": self.opened}
         self._other: str | None = None
         self._snapshots = 0
         self._own = editing.own_file(self.opened)
-        self._disk = ""  # the opened file, as the changes to its text began or as it was written
+        self._disk = ""  # text of the opened file when its edits began or when it was written
         self._saved = self.edits.state
         self._written: set[Path] = set()  # files that were saved from here
         if self.against is not None:
@@ -158,7 +158,7 @@ class ViewState:
 
     @property
     def selection(self) -> Selection:
-        """The pipeline with all edits, among them a camera that was moved."""
+        """The pipeline with all edits, including a moved camera."""
         if self.edits.text is None:
             return structs.replace(self.opened, sets=(*self.opened.sets, *self.edits.sets))
         return structs.replace(self.opened, source=shown_file(self.file), text=self.edits.text, sets=self.edits.sets)
@@ -174,7 +174,7 @@ class ViewState:
 
     @property
     def is_behind(self) -> bool:
-        """Whether the opened file has changed on the disk since the changes to its text began."""
+        """Whether the opened file has changed on disk since the changes to its text began."""
         return self.edits.text is not None and self._own is not None and self._disk != _read(self._own)
 
     @property
@@ -237,7 +237,7 @@ class ViewState:
     # --- the file ----------------------------------------------------------------------------------------------------
 
     def edit(self, operations: Sequence[Sequence[Any]]) -> list[str]:
-        """Do operations on the graph, and return what they took along, in words; a mistake changes nothing."""
+        """Apply operations to the graph, and describe their further effects; a mistake changes nothing."""
         text, sets = self.edits.text, self.edits.current
         if text is None:
             text = self._disk = editing.text_of(self.opened)
@@ -251,7 +251,7 @@ class ViewState:
         return pipeline.notes
 
     def draft(self, name: object) -> tuple[str, str, str]:
-        """Return what `save` would write under a name, the difference, and the digest of what is there."""
+        """Return what `save` would write under a name, the difference, and the digest of the existing file."""
         path = self.file if name is None else self._path(name)
         before = _read(path) if path == self._own or path in self._written else ""
         if path == self._own:
@@ -265,11 +265,11 @@ class ViewState:
         return text, editing.difference(before, text, path.name), _digest(before)
 
     def save(self, name: object, digest: str) -> str:
-        """Write the file and return its text; of the opened one, `digest` says what it replaces.
+        """Write the file and return its text; for the opened file, `digest` identifies the contents that it replaces.
 
         Raises:
             InputError: the pipeline does not link.
-            UsageError: (RG500) the name is no plain one; (RG531) the file exists, or has changed.
+            UsageError: (RG500) the name is not a plain name; (RG531) the file exists, or has changed.
         """
         path = self._path(name)
         text, _, found = self.draft(name)
@@ -277,7 +277,7 @@ class ViewState:
             write_new(path, text)
             self._written.add(path)
         elif digest != found:
-            raise UsageError(Problem("RG531", f"'{path.name}' has changed on the disk; look at the difference first"))
+            raise UsageError(Problem("RG531", f"'{path.name}' has changed on disk; look at the difference first"))
         else:
             before = _read(path)
             replace_text(path, text)
@@ -287,7 +287,7 @@ class ViewState:
         return text
 
     def keep(self) -> Path | None:
-        """Write changes that were not saved into a file of their own, and return it; None if there are none."""
+        """Write unsaved changes into a separate file, and return it; None if there are none."""
         if not self.is_changed:
             return None
         stem = Path(self.opened.label).stem
@@ -316,7 +316,7 @@ class ViewState:
     # --- messages ----------------------------------------------------------------------------------------------------
 
     def apply(self, message: messages.PageMessage) -> bool:
-        """Do what a page asks for, and return whether another picture is needed."""
+        """Handle a message of a page, and return whether another picture is needed."""
         match message:
             case messages.SetMessage(path, value, again):
                 self.edits = self.edits.set(path, value, again=again)
@@ -377,7 +377,7 @@ class ViewState:
         self.edits = edits
 
     def _keep_frame(self) -> None:
-        """Make the frame an edit; moving it on is one step of undo."""
+        """Make the frame an edit; consecutive changes are one undo step."""
         if self.frame == int(self.edits.current.get(FRAME, 1)):
             return
         again = self.edits.differs_by(FRAME)
@@ -404,13 +404,13 @@ class ViewState:
         self._keep_camera()
 
     def _keep_camera(self) -> None:
-        """Make a camera that was moved an edit, once nothing is held: it can be undone, saved and copied."""
+        """Make a moved camera an edit, once nothing is being dragged, so that it can be undone, saved and copied."""
         if self.camera is not None and not self.held:
             self.edits = self.edits.set(CAMERA, camera_words(self.camera))
             self.camera = None
 
     def _compare_with(self, name: str, selection: Selection) -> None:
-        """Add something to compare with, in place of the oldest where there are too many."""
+        """Add a selection to compare with, replacing the oldest if there are too many."""
         if name not in self._others and len(self._others) == MOST_COMPARED:
             del self._others[list(self._others)[1]]  # the first is the file as it was opened
         self._others[name] = selection
@@ -420,7 +420,7 @@ class ViewState:
 def _read(path: Path) -> str:
     try:
         return path.read_text("utf-8-sig", "replace")
-    except OSError:  # it is gone: saving makes it again
+    except OSError:  # it was deleted; saving creates it again
         return ""
 
 

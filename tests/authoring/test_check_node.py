@@ -146,7 +146,7 @@ HOSTILE = {
     "prints": ("while True:\n    print('x' * 1000)\n", r"glow.py:2:1: RG452 it takes longer than 2 s"),
     "eats": ("x = []\nwhile True:\n    x.append(bytearray(1 << 24))\n", r"glow.py:3:1: RG453 .* limit of 500 MiB"),
     "gulps": ("x = bytearray(1 << 40)\n", r"glow.py:1:1: RG453 it needs more memory than the limit of 500 MiB"),
-    "nothing": ("x = 1\n", r"glow.py: RG492 the module of node type 'glow' must define one Node class, it has none"),
+    "nothing": ("x = 1\n", r"glow.py: RG492 the module of node type 'glow' must define one Node class; it has none"),
     "children": (
         "import os, time\nif os.fork() == 0:\n    time.sleep(30)\nos._exit(4)\n",
         r"glow.py:4:1: RG450 .* status 4",

@@ -119,7 +119,7 @@ def test_two_of_one_name(plugin: Path, tmp_path: Path) -> None:
         ("x = 1\nraise RuntimeError('not\\ntoday')\n", r"odd.py:2:1: RG491 .* imported: RuntimeError: not today"),
         ("def f(:\n", r"odd.py:1:1: RG491 node type 'odd' cannot be imported: SyntaxError"),
         ("import nonexistent_module\n", r"odd.py:1:1: RG491 .*ModuleNotFoundError"),
-        ("x = 1\n", r"odd.py: RG492 the module of node type 'odd' must define one Node class, it has none"),
+        ("x = 1\n", r"odd.py: RG492 the module of node type 'odd' must define one Node class; it has none"),
         (
             GOOD.replace("._shared import SIZE", "math import pi as SIZE") + "\nclass Other(Good):\n    '''More.'''\n",
             r"odd.py: RG492 .* it has Good, Other",

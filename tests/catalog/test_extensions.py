@@ -133,14 +133,14 @@ def test_plugins_may_share_a_meaning_but_not_disagree(write: Write) -> None:
         ("EXTENSION = Extension(meshes={'.stl': 1})", r"meshes\['\.stl'\] is 1, not a function"),
         (
             "EXTENSION = Extension(meshes={'stl': len})",
-            "meshes has the key 'stl', which is not a file's ending, a dot and small letters",
+            "meshes has the key 'stl', which is not a file's ending, a dot and lower-case letters",
         ),
         ("EXTENSION = Extension(meshes={'.obj': len})", "meshes has '.obj', which rendergraph reads itself"),
         ("EXTENSION = Extension(images={'.png': len})", "images has '.png', which rendergraph reads itself"),
         ("EXTENSION = Extension(metrics={'flip': len})", "metric 'flip' is one of rendergraph's own"),
         (
             "EXTENSION = Extension(metrics={'l-1': len})",
-            "metrics has the key 'l-1', which is not a word of small letters",
+            "metrics has the key 'l-1', which is not a word of lower-case letters",
         ),
         (
             "EXTENSION = Extension(choices={'shading': 'toon.glsl'})",
@@ -148,7 +148,7 @@ def test_plugins_may_share_a_meaning_but_not_disagree(write: Write) -> None:
         ),
         (
             "EXTENSION = Extension(choices={'shading': {'Toon': 'toon.glsl'}})",
-            "has the key 'Toon', which is not a word of small letters",
+            "has the key 'Toon', which is not a word of lower-case letters",
         ),
         ("EXTENSION = Extension(choices={'shading': {'toon': 3}})", "is 3, not the name of an include"),
     ],

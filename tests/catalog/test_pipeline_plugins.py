@@ -150,7 +150,7 @@ def test_a_path_on_the_command_line_is_the_users_own(
 @pytest.mark.parametrize(
     ("effect", "text"),
     [
-        ("../times.frag", "RG012 '../times.frag' lies outside the folder of the file it is reached from; --asset-root"),
+        ("../times.frag", "RG012 '../times.frag' lies outside the folder of the file that names it; --asset-root"),
         ("/etc/times.frag", "RG012 '/etc/times.frag' lies outside"),
         ("./link.frag", "RG012 './link.frag' lies outside"),
         ("./in/../../times.frag", "RG012 './in/../../times.frag' lies outside"),

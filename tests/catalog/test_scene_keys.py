@@ -235,13 +235,13 @@ def test_a_key_of_rendergraph_cannot_be_taken(home: Path, section: str, name: st
 @pytest.mark.parametrize(
     ("key", "says"),
     [
-        (SceneKey("Lens", float, "x"), "has a name that is not a word of small letters"),
+        (SceneKey("Lens", float, "x"), "has a name that is not a word of lower-case letters"),
         (SceneKey("lens", list, "x"), "has the type <class 'list'>; use float, int, bool, str, a Literal of words"),
         (SceneKey("lens", tuple[float], "x"), "a tuple of 2 to 16 floats or Image"),
         (SceneKey("lens", tuple[int, int], "x"), "a tuple of 2 to 16 floats or Image"),
         (SceneKey("lens", Literal[1, 2], "x"), "a Literal of words"),
         (SceneKey("lens", float, "x", 2.0, max=1), "has the default 2.0, which is not a legal value"),
-        (SceneKey("lens", float, "x", min=2, max=1), "has the limits 2 and 1, between which no number lies"),
+        (SceneKey("lens", float, "x", min=2, max=1), "has an empty range: min 2 > max 1"),
         (SceneKey("lens", bool, "x", min=0), "has limits, which are for numbers"),
         (SceneKey("lens", Image, "x", "a.png"), "is an image, which has no default"),
         (SceneKey("lens", float, " "), "has no documentation"),

@@ -245,7 +245,5 @@ def test_what_a_header_keeps_is_made_once(gl: rg.Session, tmp_path: Path) -> Non
     assert (frame["image"] == 3.0).all()
     assert [entry["node"] for entry in frame.passes] == ["s"]
     (tmp_path / "table.frag").write_text(KEPT.replace("= value", "= value * camera.eye.x"))
-    with pytest.raises(
-        InputError, match=r"table\.frag:10:\d+: RG439 .* 't.table', which is kept, but looks at the camera"
-    ):
+    with pytest.raises(InputError, match=r"table\.frag:10:\d+: RG439 .* 't.table', which is kept, but uses the camera"):
         rg.load(tmp_path / "p.yaml", size=SIZE).check()

@@ -257,7 +257,7 @@ def test_an_include_of_blanks_is_read_in_time(tmp_path: Path) -> None:
 def test_ports_and_parameters_are_bounded(tmp_path: Path) -> None:
     text = "out vec4 c;\n" + "".join(f"uniform float a{number};\n" for number in range(255))
     assert len(load(tmp_path, text).cls.parameters()) == 255
-    said = ["1:1: RG441 the shader has 257 ports and parameters, 256 are the limit; a texture holds tables"]
+    said = ["1:1: RG441 the shader has 257 ports and parameters, the limit is 256; use a texture for tables"]
     assert mistakes(tmp_path, f"{text}uniform float more;\n") == said
 
 
@@ -302,7 +302,7 @@ def test_ports_and_parameters_are_bounded(tmp_path: Path) -> None:
         ),
         (
             "layout(location = 1) out vec4 c;",
-            "1:31: RG441 locations of outputs go from 0 without gaps, for all or for none; leave the layouts out",
+            "1:31: RG441 locations of outputs start at 0 and have no gaps, for all outputs or none; leave the layouts out",
         ),
         ("#version 300 es\nout vec4 c;", "1:1: RG404 '#version' is written by rendergraph; remove the line"),
         (

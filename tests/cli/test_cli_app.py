@@ -175,7 +175,7 @@ def test_errors_become_messages_and_exit_codes(cli: Any, fake: Any, kind: Any, c
         (
             ImportError("No module named 'numpy'", name="numpy"),
             1,
-            "RG509 a library that rendergraph needs does not load",
+            "RG509 a library that rendergraph needs cannot be loaded",
         ),
         (ImportError("cannot import", name="rendergraph.x"), 1, "RG599 internal error (a bug in rendergraph): Import"),
         (BrokenPipeError(), 0, ""),

@@ -190,7 +190,7 @@ def test_a_hundred_mistakes_say_that_there_are_more(cli: Any, tmp_path: Path) ->
 def test_a_number_too_large_is_not_told_to_be_none(cli: Any, tmp_path: Path) -> None:
     (tmp_path / "scene.yaml").write_text("scene: 1\nobjects: {box: {shape: box, at: [1e39, 0, 0]}}\n")
     assert (
-        "'at': expected a list of 3 numbers, got [1e+39, 0, 0]; numbers end at 1e+12"
+        "'at': expected a list of 3 numbers, got [1e+39, 0, 0]; the largest number is 1e+12"
         in cli("explain", "scene.yaml").err
     )
     (tmp_path / "scene.yaml").write_text("scene: 1\nobjects: {box: {shape: box, at: [1, 0]}}\n")

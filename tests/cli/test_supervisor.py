@@ -107,7 +107,7 @@ def test_a_draw_takes_no_longer_than_draw_timeout(slow: Path) -> None:
     process = start(slow, "run", "slow.yaml", "--plugin", "slow.frag", "--draw-timeout", "0.3")
     _, err = process.communicate(timeout=30)
     assert process.returncode == 1
-    assert err == "RG622 --draw-timeout passed while drawing step 'burn'; allow more, or draw less at a time\n"
+    assert err == "RG622 --draw-timeout exceeded while drawing step 'burn'; allow more, or draw less at a time\n"
 
 
 @pytest.mark.parametrize(

@@ -142,7 +142,7 @@ def test_what_is_kept_may_be_made_of_it_and_is_made_once(gl: rg.Session, plugins
         "#include <environment.glsl>\nuniform sampler2D picture; uniform float gain; out vec4 made;"
         "void main() { made = gain * textureLod(picture, vec2(0.5), 0.0) * environment_transform.z; }"
     )
-    with pytest.raises(InputError, match=r"RG439 .*how bright the environment is and how it is turned"):
+    with pytest.raises(InputError, match=r"RG439 .*the intensity and rotation of the environment"):
         pipeline(plugins, nodes, {"made": "hold.made"}, scene=scene).check()
 
 
@@ -190,7 +190,7 @@ def test_what_is_not_there_is_said(tmp_path: Path, name: str, code: str) -> None
 
 
 def test_sun_and_turbidity_go_with_the_sky(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="RG321 'turbidity' goes with a sky"):
+    with pytest.raises(InputError, match="RG321 'turbidity' requires a sky"):
         rg.load("forward", scene=lit(tmp_path, "environment: {file: studio, turbidity: 4}")).link()
 
 

@@ -255,6 +255,6 @@ def test_a_uniform_that_nothing_sets_is_named(draw: Draw) -> None:
     shader = {"wrong.frag": "uniform float gian; out vec4 color; void main() { color = vec4(gian); }"}
     with pytest.raises(
         InputError,
-        match=r"RG434 node 'w' .*wrong.frag looks at uniform 'gian', which nothing sets; did you mean 'gain'",
+        match=r"RG434 node 'w' .*wrong.frag uses uniform 'gian', which nothing sets; did you mean 'gain'",
     ):
         draw("nodes: {w: {type: wrong}}\noutputs: {image: w.color}", Wrong, shaders=shader)

@@ -385,15 +385,15 @@ outputs: {image: b.color}
     [
         (
             Eyed,
-            r"eye.frag:2:22: RG439 node 'a' \(eyed\): \S+: it makes 'a.table', which is kept, but looks at the camera",
+            r"eye.frag:2:22: RG439 node 'a' \(eyed\): \S+: it makes 'a.table', which is kept, but uses the camera",
         ),
-        (Timed, r"RG439 .* 'a.table', which is kept, but looks at the frame's time and number \('time'\)"),
-        (Lit, r"lights.frag:3:23: RG439 .* 'a.table', which is kept, but looks at the scene's lights"),
+        (Timed, r"RG439 .* 'a.table', which is kept, but uses the frame's time and number \('time'\)"),
+        (Lit, r"lights.frag:3:23: RG439 .* 'a.table', which is kept, but uses the scene's lights"),
         (Deep, r"RG439 .* it makes 'a.table', which is kept, from 'd.depth', which is not; keep that too"),
         (Defaults, r"depth.frag:1:19: RG439 .* it makes 'a.table', which is kept, but samples 'depth', which is not"),
         (Both, r"RG439 .* it makes 'a.table', which is kept, and 'a.color', which is not; make them in two steps"),
         (Scenic, r"RG439 .* it makes 'a.table', which is kept, from the scene's objects, which may move"),
-        (Remembering, r"RG439 .* which is kept, from last frame's 'a.last', another in each frame"),
+        (Remembering, r"RG439 .* which is kept, from last frame's 'a.last', which changes every frame"),
     ],
 )
 def test_check_says_what_a_kept_value_depends_on(bench: Any, cls: type[Node], said: str) -> None:

@@ -251,5 +251,5 @@ def test_an_environment_is_known_by_its_file(bench: Any, session: rg.Session, tm
 def test_materials_are_nothing_to_keep_something_of(bench: Any) -> None:
     text = "nodes: {hold: {type: hold}}\noutputs: {made: hold.made}\n"
     shader = "#include <materials.glsl>\nout vec4 made; void main() { made = materials[0].base_color; }"
-    with pytest.raises(InputError, match=r"RG439 .*looks at the scene's materials"):
+    with pytest.raises(InputError, match=r"RG439 .*uses the scene's materials"):
         bench.pipeline(text, Hold, shaders=SHADERS | {"held.frag": shader}).with_scene("spheres").check()

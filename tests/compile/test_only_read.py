@@ -73,7 +73,7 @@ def test_a_buffer_that_is_only_read_is_declared_so(author: Any, gl: rg.Session, 
     expected = (
         f"wrong.frag:{line}:{column}: RG457 node 'a' (wrong): wrong.py:{author.line('steps.full')}: buffer 'numbers' "
     )
-    assert said.startswith(expected + "is only read, so it is declared `readonly buffer numbers`")
+    assert said.startswith(expected + "is only read, so declare it as `readonly buffer numbers`")
 
 
 def test_a_functions_buffer_that_is_only_read_is_declared_so(author: Any, gl: rg.Session) -> None:

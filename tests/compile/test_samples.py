@@ -164,7 +164,7 @@ RESOLVES = {
     "depth": ("depth", "depth32f", Depth, r"'source' has values that cannot be averaged; choose a sample in a shader"),
     "normal": ("normal", None, Normal, r"'source' has values that cannot be averaged"),
     "number": ("number", None, AnyTexel, r"'source' has values that cannot be averaged"),
-    "color": ("color", "rgba32f", Radiance, r"'made' is not what 'source' becomes; declare it like that input"),
+    "color": ("color", "rgba32f", Radiance, r"'made' does not match 'source'; declare it like that input"),
 }
 
 
@@ -197,7 +197,7 @@ def test_one_sample_needs_no_resolve(bench: Any) -> None:
             steps.clear(self.plain)
             steps.resolve(self.plain, self.made)
 
-    with pytest.raises(InputError, match=r"source is 'plain', which has one sample per texel, so nothing to"):
+    with pytest.raises(InputError, match=r"source is 'plain', which has one sample per texel, so there is nothing to"):
         bench.pipeline("nodes: {a: {type: again}}\noutputs: {o: a.made}", Again).check()
 
 

@@ -385,7 +385,7 @@ def test_the_frame_before_is_that_of_the_scene(bench: Any) -> None:
     counts, texels = ran(bench, ONE, BEFORE, MOVES)
     assert counts == [1, 0, 1, 1, 0]  # it looks at the records of instances, too
     assert [texel[1] - texels[0][1] for texel in texels] == [0, 0, 0, 3, 3]
-    with pytest.raises(InputError, match=r"RG439 .* where the objects were in the frame before"):
+    with pytest.raises(InputError, match=r"RG439 .* the transforms of objects in the previous frame"):
         ran(bench, KEPT, BEFORE, MOVES)
 
 
@@ -549,7 +549,7 @@ def test_an_include_about_the_scene_needs_the_scene(bench: Any) -> None:
 def test_nothing_is_linked_to_the_scene(bench: Any) -> None:
     text = "nodes: {p: {type: plain}, a: {type: of, inputs: {scene: p.color}}}\noutputs: {image: a.color}\n"
     shaders = {"plain.frag": WHITE, "of.frag": PLACE}
-    with pytest.raises(InputError, match=r"'a.scene' expects a scene, but 'p.color' .* leave it out"):
+    with pytest.raises(InputError, match=r"'a.scene' expects a scene, but 'p.color' .* leave the link out"):
         bench.pipeline(text, Of, Plain, shaders=shaders).check()
 
 

@@ -139,6 +139,6 @@ def test_a_border_has_the_declared_value(draw: Draw) -> None:
     np.testing.assert_array_equal(ids[0, 3], [1, 2, 65535, 3])
     text = "nodes: {i: {type: ids}, e: {type: edge, inputs: {source: i.ids}}}\noutputs: {image: e.color}"
     with pytest.raises(
-        InputError, match=r"RG215 'e.source' has a border, so no whole numbers, but 'i.ids' .* rgba16ui"
+        InputError, match=r"RG215 'e.source' has a border, which excludes integers, but 'i.ids' .* rgba16ui"
     ):
         draw(text, Ids, Edge, shaders=shaders)

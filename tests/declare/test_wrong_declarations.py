@@ -16,8 +16,8 @@ DECLARATIONS = {
     'gl_color = Output(Radiance, doc="D.")  # here': "'gl_color' is not a lower-case GLSL identifier",
     'two__lines = Output(Radiance, doc="D.")  # here': "'two__lines' is not a lower-case GLSL identifier",
     'depth = Input(Depth, doc="D.")\ndepth_views: float = param(default=1.0, doc="D.")  # here': "'depth_views' is what shaders are given for the views of port 'depth'; rename one",
-    'depth = Input(Depth, doc="D.")  # here\nhas_depth: bool = define(default=True, doc="D.")': "input 'depth' and define 'has_depth' would define one macro, HAS_DEPTH; rename one",
-    'curve: Literal["a", "b"] = define(default="a", doc="D.")  # here\ncurve_a: bool = define(default=True, doc="D.")': "choice 'a' of 'curve' and define 'curve_a' would define one macro, CURVE_A; rename one",
+    'depth = Input(Depth, doc="D.")  # here\nhas_depth: bool = define(default=True, doc="D.")': "input 'depth' and define 'has_depth' would define the same macro, HAS_DEPTH; rename one",
+    'curve: Literal["a", "b"] = define(default="a", doc="D.")  # here\ncurve_a: bool = define(default=True, doc="D.")': "choice 'a' of 'curve' and define 'curve_a' would define the same macro, CURVE_A; rename one",
     'light_count: int = define(default=1, doc="D.")  # here': "define 'light_count' would define the macro LIGHT_COUNT, which is rendergraph's own; choose another name",
     'albedo = Input(Albedo, group="albedo", doc="D.")  # here': "group 'albedo' has the name of a port or parameter",
     # docs
@@ -87,7 +87,7 @@ DECLARATIONS = {
     'mode: Literal["four by four"] = define(default="four by four", doc="D.")  # here': "parameter 'mode' is a define, so its type is one number, a switch, or Literal[…] with words of letters, digits, '_' and '-'",
     'gain = param(default=1.0, doc="D.")  # here': "parameter 'gain' has no type; write it as in `gain: float = param(…)`",
     "gain: float  # here": "parameter 'gain' is a plain value; declare it with param(…), define(…) or structural(…)",
-    'gain: flaot = param(default=1.0, doc="D.")  # here': "the types of its parameters cannot be worked out: NameError: name 'flaot' is not defined",
+    'gain: flaot = param(default=1.0, doc="D.")  # here': "the types of its parameters cannot be resolved: NameError: name 'flaot' is not defined",
     # the class
     'twin = "traced shadows"  # here': "`twin` is 'traced shadows'; it is the name of a node type, such as 'traced_shadows'",
     "twin = 3  # here": "`twin` is 3; it is the name of a node type, such as 'traced_shadows'",

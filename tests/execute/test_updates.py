@@ -100,7 +100,11 @@ def test_a_uniform_follows_what_update_sets(values: Any) -> None:
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("wnd", 1.0, "set_uniform is given 'wnd', which is no parameter and no keyword of a step; did you mean 'wind'"),
+        (
+            "wnd",
+            1.0,
+            "set_uniform is given 'wnd', which is not a parameter or a keyword of a step; did you mean 'wind'",
+        ),
         ("wind", 1.0, "set_uniform: declares 'wind' as vec2, but it is given 1 number"),
         ("wind", "x", "wind='x': expected"),
     ],

@@ -251,7 +251,7 @@ class Thorough(Careless):
 
 
 def test_a_step_that_names_all_inputs_is_not_said_to_name_none(bench: Any) -> None:
-    with pytest.raises(InputError, match=r"RG117 the steps form a cycle: [^;]*; '@previous' behind one"):
+    with pytest.raises(InputError, match=r"RG117 the steps form a cycle: [^;]*; append '@previous' to a link"):
         bench.pipeline(TEXT.replace("type: bracket", "type: thorough"), *NODES, Thorough, shaders=SHADERS).check()
 
 

@@ -128,7 +128,7 @@ def test_what_numpy_raises_is_at_the_authors_line(author: Any) -> None:
 def test_a_record_that_gives_something_back(author: Any, head: str, body: str, kind: str) -> None:
     author.node(f"{COLOR}{head} record(self, steps):\n    {body}")
     (said,) = author.said(author.pipeline().check)
-    expected = f"wrong.py: `record` gives back a {kind}; it calls steps.… and returns nothing"
+    expected = f"wrong.py: `record` returned a {kind}; it must call steps.… and return nothing"
     assert said == f"test.yaml:4:3: RG423 node 'a' (wrong): {expected}"
 
 

@@ -90,5 +90,5 @@ def test_pictures_are_the_same_to_the_bit(gl: rg.Session, name: str) -> None:
 
 def test_a_device_of_another_api_is_refused(gl: rg.Session, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gl.device.raw, "glGetUnsignedBytei_vEXT", lambda *_: None, raising=False)
-    with gl.device.current(), pytest.raises(RenderError, match="Vulkan does not have the device that OpenGL draws on"):
+    with gl.device.current(), pytest.raises(RenderError, match="Vulkan does not offer the device that OpenGL uses"):
         make_blocks(gl.device, [DESCS])

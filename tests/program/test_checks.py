@@ -118,7 +118,7 @@ def test_a_missing_shader_is_found_by_check(bench: Any) -> None:
 def test_one_sample_of_a_multisampled_texture_wants_a_resolve(bench: Any) -> None:
     said = (
         r"reader\.frag:1:19: RG214 node 'r' \(reader\): 'many' is read as one sample per texel \(sampler2D\), but 'm.many' "
-        r"has 4 samples; resolve it before, or declare it as sampler2DMS"
+        r"has 4 samples; resolve it first, or declare it as sampler2DMS"
     )
     with pytest.raises(InputError, match=said):
         pipeline(bench, "many", "m.many", "sampler2D").check()

@@ -357,7 +357,7 @@ CASES = {
     "floats as whole numbers": (
         DRAWN,
         {"wrong.vert": "in ivec3 in_position;\nvoid main() { gl_Position = vec4(in_position, 1.0); }"},
-        r"wrong\.vert:1:10: RG428 .*: wrong\.vert reads vertex attribute 'in_position' as whole numbers, but it holds "
+        r"wrong\.vert:1:10: RG428 .*: wrong\.vert reads vertex attribute 'in_position' as integers, but it holds "
         r"floats \(3f\)",
     ),
     "a sampler of nobody's": (
@@ -369,7 +369,7 @@ CASES = {
     "a uniform of nobody's": (
         COLOR + 'gain: float = param(default=1.0, doc="Gain.")',
         {"wrong.frag": "out vec4 color;\nuniform float gian, gain;\nvoid main() { color = vec4(gian + gain); }"},
-        r"wrong\.frag:2:15: RG434 node 'a' \(wrong\): wrong\.frag looks at uniform 'gian', which nothing sets; did you "
+        r"wrong\.frag:2:15: RG434 node 'a' \(wrong\): wrong\.frag uses uniform 'gian', which nothing sets; did you "
         r"mean 'gain'\?",
     ),
     "an object that is not there": (
@@ -436,7 +436,7 @@ CASES = {
             "wrong.comp": "layout(local_size_x = 1) in;\nlayout(std430) buffer nubmers { float values[]; };\n"
             "void main() { values[0] = 1.0; }"
         },
-        r"wrong\.comp:2:23: RG430 .*wrong\.py:20: wrong\.comp looks at block 'nubmers', but the step has no buffer of that "
+        r"wrong\.comp:2:23: RG430 .*wrong\.py:20: wrong\.comp uses block 'nubmers', but the step has no buffer of that "
         r"name; it has numbers$",
     ),
     "a target that is not written": (
@@ -460,7 +460,7 @@ CASES = {
             "wrong.frag": "uniform sampler2D base_color_texture;\nout vec4 color;\n"
             "void main() { color = texture(base_color_texture, vec2(0)); }"
         },
-        r"wrong\.frag:1:19: RG430 .*'base_color_texture', but .* reads none; not every material has it, so it stands inside "
+        r"wrong\.frag:1:19: RG430 .*'base_color_texture', but .* reads none; not every material has it, so put it inside "
         r"#ifdef HAS_BASE_COLOR_TEXTURE$",
     ),
     "no work group": (

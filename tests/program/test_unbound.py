@@ -36,10 +36,10 @@ WRONG = {
     READ.format("normal"): "wrong.frag:1:26: RG430 node 'a' (wrong): wrong.py:LINE: wrong.frag samples 'normal', a "
     "port of the node that this step does not read; add normal=self.normal to the step, or leave it out by #ifdef "
     "HAS_NORMAL where it is not connected",
-    "normal_views[0].eye": "wrong.frag:5:38: RG430 node 'a' (wrong): wrong.py:LINE: wrong.frag looks at the views of "
+    "normal_views[0].eye": "wrong.frag:5:38: RG430 node 'a' (wrong): wrong.py:LINE: wrong.frag uses the views of "
     "'normal', a port of the node that this step does not read; add normal=self.normal to the step, or leave it out by "
     "#ifdef HAS_NORMAL where it is not connected",
-    "vec4(gian)": "wrong.frag:3:15: RG434 node 'a' (wrong): wrong.py:LINE: wrong.frag looks at uniform 'gian', which "
+    "vec4(gian)": "wrong.frag:3:15: RG434 node 'a' (wrong): wrong.py:LINE: wrong.frag uses uniform 'gian', which "
     "nothing sets; did you mean 'gain'?",
 }
 
@@ -168,7 +168,7 @@ def test_whole_numbers_at_a_shipped_node_are_named_at_the_link(author: Any) -> N
     text = "nodes:\n  a: {type: wrong}\n  b: {type: tonemap, inputs: {radiance: a.color}}\noutputs: {image: b.color}\n"
     (said,) = author.said(author.pipeline(text).check)
     assert said == (
-        "test.yaml:5:41: RG215 'b.radiance' reads no whole numbers, but 'a.color' (line 4) has the format rgba16ui"
+        "test.yaml:5:41: RG215 'b.radiance' does not read integers, but 'a.color' (line 4) has the format rgba16ui"
     )
 
 
@@ -180,7 +180,7 @@ def test_a_block_that_the_step_has_no_buffer_for(author: Any, gl: rg.Session) ->
     for act in (author.pipeline(TEXT).check, lambda: gl.render(author.pipeline(TEXT))):
         (said,) = author.said(act)
         assert said.startswith("wrong.frag:1:32: RG430 ")
-        assert said.endswith("looks at block 'number', but the step has no buffer of that name; it has numbers")
+        assert said.endswith("uses block 'number', but the step has no buffer of that name; it has numbers")
 
 
 UPDATE = """

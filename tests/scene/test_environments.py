@@ -124,10 +124,10 @@ def test_ways_to_say_where_the_sun_is(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("values", "text"),
     [
-        ("file: studio, turbidity: 3", "'turbidity' goes with a sky"),
+        ("file: studio, turbidity: 3", "'turbidity' requires a sky"),
         ("file: sky, place: [1, 2]", "'place' needs 'time' beside it"),
         ("file: sky, time: 2026-06-21T12:00Z", "'time' needs 'place' beside it"),
-        ("file: sky, place: [1, 2], time: 2026-13-21T12:00Z", "'time' is no date and time"),
+        ("file: sky, place: [1, 2], time: 2026-13-21T12:00Z", "'time' is not a date and time"),
         ("file: sky, place: [1, 2], time: noon", "a date and time such as"),
         ("file: sky, sun: [0, -1, 0], elevation_degrees: 3", "both say where the sun is"),
     ],

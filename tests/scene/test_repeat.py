@@ -236,7 +236,7 @@ WRONG = {
     "lights: {l: {type: point, repeat: {line: 2}}, l.1: {type: point}}": "'l.1' is the name of a copy of 'l'; rename",
     "lights: {l: {type: point, repeat: {file: ../a.csv}}}": "RG302",
     "lights: {l: {type: point, repeat: {file: a.csv}}}": "RG301 file of copies 'a.csv' does not exist",
-    "lights: {l: {type: point, repeat: {file: a.yaml}}}": "2:42: RG321 'a.yaml' is no table of copies; use a file",
+    "lights: {l: {type: point, repeat: {file: a.yaml}}}": "2:42: RG321 'a.yaml' is not a table of copies; use a file",
     "lights: {l: {type: point, repeat: {line: 2}}}\nkeyframes: {lights.l.1.at: {0: 1}}": "there is no 'l.1' under lights",
 }
 
@@ -264,8 +264,8 @@ def _few() -> SceneLimits:
 
 
 BROKEN = {
-    "a,b\n1,2": "has a mistake in line 1: 'a' is no column, or there twice; available: b, g, intensity",
-    "x,y,x\n1,2,3": "has a mistake in line 1: 'x' is no column, or there twice",
+    "a,b\n1,2": "has a mistake in line 1: 'a' is not a column, or occurs twice; available: b, g, intensity",
+    "x,y,x\n1,2,3": "has a mistake in line 1: 'x' is not a column, or occurs twice",
     "x,y,z\n1,2": "has a mistake in line 2: 2 values, not 3",
     "x,y,z\n1,2,up": "has a mistake in line 2: could not convert string to float: 'up'",
     "x,y,z\n\n1,2,nan": "has 'at' [1.0, 2.0, nan] in row 1; it must be finite",
@@ -273,7 +273,7 @@ BROKEN = {
     "": "has no rows",
     "intensity\n-1": "has 'intensity' [-1.0] in row 1; it must be at least 0",
     "range\n0": "has 'range' [0.0] in row 1; it must be above 0",
-    "x,scale\n1,2": "has a mistake in line 1: 'scale' is no column",
+    "x,scale\n1,2": "has a mistake in line 1: 'scale' is not a column",
     "x\n1\n2\n3\n4\n5\n6\n7": "has a mistake in line 7: too many rows",
 }
 

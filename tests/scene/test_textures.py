@@ -206,7 +206,7 @@ def test_mistakes(tmp_path: Path, material: str, message: str) -> None:
             "extension.py",
             'float, "Amplitude.", 0.02',
             'float, "Amplitude."',
-            "RG495 .* no number or tuple with a default",
+            "RG495 .* not a number or tuple with a default",
         ),
         ("waves.glsl", "float height = high", "float height = hihg", r"waves.glsl:5:20: RG410 .* did you mean 'high'"),
     ],

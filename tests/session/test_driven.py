@@ -62,7 +62,7 @@ def test_another_pipeline_may_lack_the_node(gl: rg.Session, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("keyframes", "message"),
     {
-        "nodes.bloom.intensty: {0: 0}": "'intensty' is no parameter; did you mean 'intensity'?",
+        "nodes.bloom.intensty: {0: 0}": "'intensty' is not a parameter; did you mean 'intensity'?",
         "nodes.bloom.levels: {0: 1, 1: 3}": "'levels' is fixed when the pipeline is compiled",
         "nodes.bloom.intensity: {0: 0, 1: 40}": "40: it must be at most 16",
         "nodes.bloom.intensity: {0: [1, 2]}": "it expected a number",

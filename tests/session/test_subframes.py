@@ -155,5 +155,5 @@ def test_a_picture_of_moments_can_be_rendered_again(gl: rg.Session, scene: Path)
 def test_bad_numbers(scene: Path) -> None:
     with pytest.raises(UsageError, match="subframes: expected a number from 1 to 4096, got 0"):
         rg.load("forward", scene=scene).expand(subframes=0)
-    with pytest.raises(UsageError, match=r"shutter: expected a share of a frame, 0 to 1, got 1\.5"):
+    with pytest.raises(UsageError, match=r"shutter: expected a fraction of a frame, 0 to 1, got 1\.5"):
         rg.load("forward", scene=scene).select(shutter=1.5)

@@ -592,7 +592,7 @@ def test_a_change_on_the_disk_is_said_beside_the_changes_of_the_page(show: Calla
     pick(hand, "bloom")
     hand.page.wait_for_selector("[data-node=bloom]")
     file.write_text("rendergraph: 1\nextends: forward\nsize: [32, 18]\n")
-    hand.page.wait_for_selector("#problems:has-text('has changed on the disk')")
+    hand.page.wait_for_selector("#problems:has-text('has changed on disk')")
     hand.page.click("#save")
     hand.page.wait_for_selector("#draft:has-text('-size: [32, 18]')")
     hand.page.keyboard.press("Escape")

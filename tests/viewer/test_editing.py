@@ -103,7 +103,7 @@ def test_a_file_that_changed_meanwhile_is_not_overwritten_unseen(state: ViewStat
     assert not state.is_behind
     (folder / "mine.yaml").write_text(MINE + "  light: {params: {ambient: 0.9}}\n")
     assert state.is_behind
-    with pytest.raises(UsageError, match="has changed on the disk"):
+    with pytest.raises(UsageError, match="has changed on disk"):
         state.save("mine.yaml", digest)
     assert "-  light: {params: {ambient: 0.9}}" in state.draft("mine.yaml")[1]
     say(state, do="reload")

@@ -112,7 +112,7 @@ function showProblems(extra = []) {
   });
   const more = lines.splice(MOST_PROBLEMS);
   $("problems").replaceChildren(...lines, more.length ? h("details", {}, h("summary", {}, `${more.length} more`), ...more) : "", problems.length && picture ? h("p", {}, "Showing the last good picture.") : "",
-  state.is_behind ? h("p", {}, `${state.file} has changed on the disk since it was changed here. “Save as…” shows what it would overwrite. `,
+  state.is_behind ? h("p", {}, `${state.file} has changed on disk since it was changed here. “Save as…” shows what it would overwrite. `,
     h("button", { onclick: () => send({ do: "reload" }) }, "Discard my changes and reload the file")) : "");
 }
 
