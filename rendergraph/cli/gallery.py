@@ -43,6 +43,7 @@ def command(
 
     require(*EXTRA)
     from rendergraph.images.files import write_file
+    from rendergraph.session import stages
     from rendergraph.session.gpu import Gpu
     from rendergraph.viewer.export import Exported, export
     from rendergraph.viewer.site import index
@@ -53,16 +54,19 @@ def command(
         raise UsageError(Problem("RG500", "two of the pipelines have the same name; their pages would be one file"))
     if "index" in selections:
         raise UsageError(Problem("RG500", "a pipeline called 'index' would overwrite the site's index"))
-    for selection in selections.values():
-        options.linked(selection)  # report all mistakes before the first picture
+    # All mistakes are reported before the first picture.
+    planned = {name: options.linked(selection).check() for name, selection in selections.items()}
     folder.mkdir(parents=True, exist_ok=True)
     pages: dict[str, Exported] = {}
+    times: dict[str, float] = {}
     with Gpu(device) as gpu:
         for name, selection in selections.items():
             pages[name] = page = export(ViewState(selection, Path.cwd()), gpu)
+            # The first frame compiles and uploads; the median leaves it out.
+            times[name] = stages.draw_last(planned[name].for_frames(range(1, 4), timed=True), gpu).frame_ms["median"]
             write_file(folder / f"{name}.html", page.html)
             write_file(folder / f"{name}.png", page.picture)
-    write_file(folder / "index.html", index(title, pages))
+    write_file(folder / "index.html", index(title, pages, times))
     files = ("index.html", *(f"{name}.{ending}" for name in pages for ending in ("html", "png")))
     outputs = [str(folder / file) for file in files]
     emit_json({"outputs": outputs}) if as_json else emit(outputs[0])

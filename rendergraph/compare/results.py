@@ -212,8 +212,9 @@ class Result:
         one = known[0]
         if one.reduction is None or one.reduction <= 0:
             return f"no twin reduces its error, which has other causes than {', '.join(e.node for e in known)}"
+        part = "most" if one.reduction > 0.5 else "the largest known part"
         return (
-            f"most of its error comes from {one.node} ({one.type}): with {one.twin} the relative MSE is "
+            f"{part} of its error comes from {one.node} ({one.type}): with {one.twin} the relative MSE is "
             f"{one.relative_mse:.4g}, {100 * one.reduction:.3g} % smaller"
         )
 

@@ -312,20 +312,24 @@ def first_difference(
     import networkx as nx  # needed for a difference alone, and slow to import
 
     counterparts = {new: old for old, new in difference.nodes.items()}
-    for node in passes(plan):
-        if node not in counterparts:
-            continue
+    differing: dict[str, str] = {}  # node to its first output that differs
+    for node in (name for name in passes(plan) if name in counterparts):
         for port in graph[node].node.outputs():
             a, b = base.arrays.get(f"{counterparts[node]}.{port}"), variant.arrays.get(f"{node}.{port}")
-            if a is None or b is None or _same(a, b):
-                continue
-            most, share = _amount(a, b)
-            semantic = variant.info(f"{node}.{port}").semantic
-            leading, changed = {node, *nx.ancestors(graph.dag, node)}, {*difference.changed(), *difference.added}
-            causes = tuple(n.id for n in graph.nodes if n.id in leading & changed)
-            added = tuple(cause for cause in causes if cause in difference.added)
-            return Difference(node, counterparts[node], port, most, share, causes, added, (a, b), semantic)
-    return None
+            if a is not None and b is not None and not _same(a, b):
+                differing.setdefault(node, port)
+    # Passes are in the order of their first steps. If that only fills a table, a node may read one that follows.
+    leading = {node: nx.ancestors(graph.dag, node) for node in differing}
+    first = next((node for node in differing if leading[node].isdisjoint(differing)), next(iter(differing), None))
+    if first is None:
+        return None
+    end, other = f"{first}.{differing[first]}", counterparts[first]
+    pixels = base.arrays[f"{other}.{differing[first]}"], variant.arrays[end]
+    changed = {*difference.changed(), *difference.added}
+    causes = tuple(n.id for n in graph.nodes if n.id in changed and n.id in {first, *leading[first]})
+    added = tuple(cause for cause in causes if cause in difference.added)
+    semantic = variant.info(end).semantic
+    return Difference(first, other, differing[first], *_amount(*pixels), causes, added, pixels, semantic)
 
 
 def _same(a: Pixels, b: Pixels) -> bool:

@@ -53,18 +53,9 @@ def describe_python(topic: str) -> dict[str, Any]:
     names = public_names()
     if (thing := names.get(topic)) is None:
         return {}
-    if not callable(thing):  # what a port carries
-        says = [getattr(thing, "declaration", ""), getattr(thing, "doc", "")]
-        return (
-            {
-                "name": topic,
-                "signature": f"{type(thing).__name__} {thing.name}",
-                "doc": "\n".join(filter(None, says)),
-                "members": [],
-            }
-            if any(says)
-            else {}
-        )
+    if not callable(thing):  # a Semantic or a Signature: what a port carries
+        text = "\n".join(filter(None, (getattr(thing, "declaration", ""), _line(thing))))
+        return {"name": topic, "signature": type(thing).__name__, "doc": text, "members": []} if text else {}
     members = public_members(thing) if inspect.isclass(thing) else ()
     return {
         "name": topic,

@@ -110,8 +110,9 @@ def _drop(name: str, node: Value, change: Value, new_type: Value, names: TypeNam
         lost = [key for key in inherited if key not in known and key not in own]
         if part in parts and lost:
             left = {key: value for key, value in inherited.items() if key not in lost}
-            parts[part] = parts[part].with_data(left)
-            if not left:
+            if left:
+                parts[part] = parts[part].with_data(left)
+            else:
                 del parts[part]
             word_for = part.removesuffix("s") if len(lost) == 1 else part
             listed = ", ".join(f"'{key}'" for key in lost)

@@ -105,10 +105,8 @@ class RenderService:
         try:
             return self._answer(request)
         except RendergraphError as error:
-            selection = request.selection if isinstance(request, RenderRequest) else Selection("")
-            return Response(
-                problems=tuple(one.as_json() | {"node": self._node_at(one, selection)} for one in error.problems)
-            )
+            problems = (problem.as_json() | {"node": self._node_at(problem, request)} for problem in error.problems)
+            return Response(problems=tuple(problems))
 
     @singledispatchmethod
     def _answer(self, request: Request) -> Response:
@@ -334,16 +332,20 @@ class RenderService:
     def _encode(self, picture: npt.NDArray[np.uint8], ending: str) -> bytes:
         return images.picture_bytes((Path(f"picture{ending}"), picture, None, "data", False), {})
 
-    def _node_at(self, problem: Problem, selection: Selection) -> str | None:
+    def _node_at(self, problem: Problem, request: Request) -> str | None:
         """Return the node that is declared or set at a problem's place, or whose type comes from that file."""
         place = problem.place
-        id = editing.node_at(problem, selection)
-        if id is not None or place is None or self._planned is None or editing.is_in_opened(place, selection):
+        if place is None or self._planned is None or not isinstance(request, RenderRequest):
+            return None
+        if editing.is_in_opened(place, request.selection) or place.option("--set") is not None:
+            return editing.node_at(problem, request.selection)
+        if (id := self._node_of_file.get(place.file)) is not None:
             return id
         nodes = self._planned.linked.graph.nodes
-        above = [n for n in nodes if n.place and n.place.file == place.file and n.place.line <= place.line]
-        last = max(above, key=lambda node: node.place.line if node.place else 0, default=None)
-        return self._node_of_file.get(place.file, last.id if last else None)
+        above = [
+            (n.place.line, n.id) for n in nodes if n.place and n.place.file == place.file and n.place.line <= place.line
+        ]
+        return max(above)[1] if above else None
 
 
 def _nodes_by_file(planned: Planned) -> dict[str, str]:

@@ -14,15 +14,18 @@ body { margin: 0 auto; max-width: 1200px; padding: 16px; background: var(--page)
 ul { list-style: none; padding: 0; display: grid; gap: 20px;
   grid-template-columns: repeat(auto-fill, minmax(min(340px, 100%), 1fr)); }
 li { border: 1px solid var(--line); border-radius: 8px; overflow: hidden; }
-img { display: block; width: 100%; } a { color: inherit; text-decoration: none; }
+img { display: block; width: 100%; height: auto; } a { color: inherit; text-decoration: none; }
 h1 { font-size: 22px; } h2 { font-size: 17px; margin: 10px 12px 2px; } p { margin: 0 12px 10px; }
 .quiet { color: var(--quiet); font-size: 13px; }
 """
 
 
-def index(title: str, pages: Mapping[str, Exported]) -> str:
-    """Return the index of a site as HTML; each page has its files under its name, as `NAME.html` and `NAME.png`."""
-    cards = "\n".join(_card(name, page) for name, page in pages.items())
+def index(title: str, pages: Mapping[str, Exported], times: Mapping[str, float]) -> str:
+    """Return the index of a site as HTML; each page has its files under its name, as `NAME.html` and `NAME.png`.
+
+    `times` has the milliseconds of a frame, by the name of the page.
+    """
+    cards = "\n".join(_card(name, page, times[name]) for name, page in pages.items())
     return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<style>\n{_STYLE}</style>\n</head>\n'
@@ -30,11 +33,12 @@ def index(title: str, pages: Mapping[str, Exported]) -> str:
     )
 
 
-def _card(name: str, page: Exported) -> str:
+def _card(name: str, page: Exported, frame_ms: float) -> str:
     pipeline, facts, name = page.pipeline, page.facts, escape(name)
     width, height = facts["size"]
     memory = pipeline["plan"]["memory"]["allocated_bytes"] / 2**20
-    cost = f"{len(facts['passes'])} passes, {facts['frame_ms']:.1f} ms, {memory:.1f} MiB at {width}×{height}"
+    passes = len({step["node"] for step in pipeline["plan"]["order"]})
+    cost = f"{passes} passes, {frame_ms:.1f} ms, {memory:.1f} MiB at {width}×{height}"
     software = " (software rasteriser)" if facts["device"]["software"] else ""
     return (
         f'<li><a href="{name}.html"><img src="{name}.png" width="{width}" height="{height}" '

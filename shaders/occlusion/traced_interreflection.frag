@@ -10,6 +10,7 @@
 #include <layers.glsl>
 #include <traced_light.glsl>
 #include "surfaces.glsl"
+#include "traced_origin.glsl"
 #include "outputs.glsl"
 #ifdef HAS_MAP
 #include <environment.glsl>
@@ -130,12 +131,7 @@ void main() {
         return;
     }
     vec3 axis = normalize(texelFetch(normal, texel, 0).xyz);
-    vec3 geometric_normal = geometric_normal_at(texel, TEXEL_CENTER, position, window_depth);
-    // At outlines, differences of depth are between two surfaces.
-    if (dot(geometric_normal, axis) < 0.25) geometric_normal = axis;
-    float distance = linear_depth(depth_views[0], window_depth);
-    vec3 leaving = geometric_normal + view_dir(depth_views[0], position);  // the view direction leads out of creases
-    vec3 origin = position + leaving * max(ray_offset(position, distance), snapped_by(distance));
+    vec3 origin = ray_origin(texel, position, axis, window_depth);
     int frame = ANIMATED * frame_index;
     vec2 shift = random_shift(pixel, frame);
     Value sum = Value(0.0);

@@ -4,6 +4,7 @@
 #include <ray_directions.glsl>
 #include <trace.glsl>
 #include "surfaces.glsl"
+#include "traced_origin.glsl"
 #ifdef FIRST_RAY  // this step traces a part of the rays
 out vec4 rays;
 #else
@@ -38,12 +39,7 @@ void main() {
     open = texelFetch(sum, pixel, 0);
 #else
     vec3 axis = normalize(texelFetch(normal, texel, 0).xyz);
-    vec3 geometric_normal = geometric_normal_at(texel, TEXEL_CENTER, position, window_depth);
-    // At outlines, differences of depth are between two surfaces.
-    if (dot(geometric_normal, axis) < 0.25) geometric_normal = axis;
-    float distance = linear_depth(depth_views[0], window_depth);
-    vec3 leaving = geometric_normal + view_dir(depth_views[0], position);  // the view direction leads out of creases
-    vec3 origin = position + leaving * max(ray_offset(position, distance), snapped_by(distance));
+    vec3 origin = ray_origin(texel, position, axis, window_depth);
     vec2 shift = random_shift(pixel, ANIMATED * frame_index);
     for (int i = FIRST_RAY; i < PAST_RAY; ++i) {
         vec3 ray = cosine_direction(axis, shifted_point(i, shift));

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 import rendergraph as rg
+from rendergraph.compare import compare
 from rendergraph.compare.results import Difference, passes
 from rendergraph.compare.tasks import every_output, first_difference, taps
 from rendergraph.diff import diff
@@ -102,3 +103,11 @@ def test_every_version_of_a_continued_texture_is_seen(make: Any, gl: rg.Session)
     first = found(gl, base, base.set("two.amount", 0.5))
     assert first is not None
     assert first.node == "two"
+
+
+def test_a_step_for_a_table_does_not_make_a_node_the_first(gl: rg.Session) -> None:
+    """`light` fills a table before `ao` runs, and lights after it."""
+    base = rg.load("ssao-gtao", size=(48, 27))
+    result = compare([base, base.set("ao.radius", 1)], frames=1, session=gl).results[1]
+    assert result.first is not None
+    assert (result.first.node, result.first.port) == ("ao", "occlusion")

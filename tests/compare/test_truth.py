@@ -521,4 +521,6 @@ def test_traced_occlusion_explains_the_error_of_the_screen_s(
         assert error.reduction is not None
         assert error.reduction > 0.8
         assert result.cause.startswith("most of its error comes from ao")
+        weak = replace(result, error_by=(replace(error, reduction=0.04),))
+        assert weak.cause.startswith("the largest known part of its error comes from ao")
     assert found.reference.noise == 0

@@ -81,3 +81,17 @@ def test_a_reduced_scale_is_interpolated(session: rg.Session, tmp_path: Path, ou
     whole = draw(session, tmp_path, 40.0, *sets).arrays[f"ao.{output}"]
     half = draw(session, tmp_path, 40.0, *sets, "ao.scale=0.5").arrays[f"ao.{output}"]
     assert np.abs(whole - half)[:, 2:-2].mean() < 0.02
+
+
+def test_no_ray_of_a_crease_begins_behind_the_other_surface(session: rg.Session, tmp_path: Path) -> None:
+    """In a right angle half of the directions are open, whatever the error of positions from depth."""
+    (tmp_path / "stairs.yaml").write_text(
+        "scene: 1\nobjects:\n  floor: {shape: box, size: [8, 1, 8], at: [0, -0.5, 0]}\n"
+        "  step: {shape: box, size: [8, 0.4, 4], at: [0, 0.2, -2]}\n"
+        "  upper: {shape: box, size: [8, 0.4, 2], at: [0, 0.6, -3]}\n"
+        "cameras: {main: {eye: [1.2, 1.9, 3], target: [0, 0.2, -0.5], fov_y_degrees: 40}}\n"
+    )
+    sets = ("ao.type=traced_occlusion", "ao.radius=0.6", "ao.samples=64")
+    pipeline = rg.load("ssao-gtao", scene=tmp_path / "stairs.yaml", size=(160, 120), sets=sets)
+    found = session.render(pipeline, outputs=(), taps=("ao.occlusion", "gbuffer.depth"))
+    assert np.asarray(found["ao.occlusion"])[np.asarray(found["gbuffer.depth"]) > 0].min() > 0.4
