@@ -52,9 +52,7 @@ def complete(
         changed = {key: {**values, "shutter": shutter} for key, values in scene.recipe.items() if key[0] == "cameras"}
         scene = replace(scene, recipe={**scene.recipe, **changed})
     if camera_name is not None and "=" in camera_name:
-        from rendergraph.scene.camera_words import described_camera  # rarely needed
-
-        cameras = {"--camera": described_camera(camera_name, next(iter(cameras.values()))), **cameras}
+        cameras = {"--camera": scene_values.described_camera(camera_name, next(iter(cameras.values()))), **cameras}
     elif camera_name is not None:
         if camera_name not in cameras:
             text = f"the scene has no camera '{camera_name}'{suggestion(camera_name, cameras)}"

@@ -206,7 +206,7 @@ class Drawing(Struct, eq=False, dict=True):
         """Return the metadata of a turntable's camera, which is not the pipeline's own."""
         if self.expanded.options.turntable is None or self.camera is None:
             return {}
-        from rendergraph.scene.camera_words import camera_words  # few cameras are put in words
+        from rendergraph.scene.scene_values import camera_words  # few cameras are put in words
 
         return {**turntable_metadata(self.expanded), "rendergraph:camera": camera_words(self.camera)}
 

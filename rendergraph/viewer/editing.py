@@ -25,7 +25,7 @@ from rendergraph.errors import InputError, Place, Problem, RendergraphError, Usa
 from rendergraph.resolve import diff, to_yaml
 from rendergraph.resolve.patches import settings
 from rendergraph.resources import shipped_pipelines, shipped_scenes
-from rendergraph.scene.camera_words import keys_of
+from rendergraph.scene.scene_values import keys_of
 from rendergraph.session import stages
 from rendergraph.session.picture_metadata import ENVIRONMENT_NAMES, is_picture
 from rendergraph.session.selection import Selection

@@ -22,9 +22,9 @@ from rendergraph.edit import PipelineText
 from rendergraph.errors import Place, Problem, RendergraphError, UsageError, shown_file
 from rendergraph.images.files import replace_text
 from rendergraph.resources import shipped_pipelines, shipped_scenes
-from rendergraph.scene.camera_words import camera_words, described_camera
 from rendergraph.scene.environments import SHIPPED
 from rendergraph.scene.model import Camera
+from rendergraph.scene.scene_values import camera_words, described_camera
 from rendergraph.session import stages
 from rendergraph.session.selection import MOST_FRAMES, Selection
 from rendergraph.viewer import camera as cameras

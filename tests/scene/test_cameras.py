@@ -13,10 +13,10 @@ import pytest
 from rendergraph import projection
 from rendergraph.projection import look_at
 from rendergraph.scene import pack
-from rendergraph.scene.camera_words import camera_words, described_camera
 from rendergraph.scene.cameras import projection_matrix, view_matrices
 from rendergraph.scene.geometry import translation
 from rendergraph.scene.model import Camera
+from rendergraph.scene.scene_values import camera_words, described_camera
 from rendergraph.steps import ViewMatrices
 
 EYE = np.eye(4)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import rendergraph as rg
-from rendergraph.scene.camera_words import keys_of
+from rendergraph.scene.scene_values import keys_of
 from rendergraph.viewer.view_state import CAMERA
 
 pytestmark = pytest.mark.slow
