@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import datetime
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -20,29 +21,14 @@ from rendergraph.declare import Section, TextureKind
 from rendergraph.document import Source, Value, from_plain, load, merge_patch, shown
 from rendergraph.errors import InputError, Option, Problem, suggestion
 from rendergraph.facts import NO_EXTRA, Extra
-from rendergraph.keys import Key, MapOf, Validator, plain
+from rendergraph.keys import Key, Table, Validator, plain
 from rendergraph.keys.values import FILE
 from rendergraph.resources import is_name, shipped_scenes
-from rendergraph.scene import animate, scene_keys, scene_values
+from rendergraph.scene import animate, model, scene_keys, scene_values
 from rendergraph.scene.curves import Curve, quaternion
 from rendergraph.scene.environments import SKIES, named
 from rendergraph.scene.geometry import rigid
 from rendergraph.scene.mesh_files import MESHES, read_mesh
-from rendergraph.scene.model import (
-    Camera,
-    Environment,
-    GeneratedTexture,
-    ImageSource,
-    Light,
-    Material,
-    Matrix,
-    Mesh,
-    Object,
-    Orbit,
-    Placement,
-    Scene,
-    Texture,
-)
 from rendergraph.scene.reading import Reading, inside
 from rendergraph.scene.repeat import Copies, copies, count_of, read_columns
 from rendergraph.scene.shapes import SHAPES, ShapePart, build
@@ -52,13 +38,15 @@ from rendergraph.stamps import record_read
 if TYPE_CHECKING:
     from rendergraph.scene.rig import Rig
 
-_DEFAULT = Material("default", base_color=(0.8, 0.8, 0.8, 1.0))
+_DEFAULT = model.Material("default", base_color=(0.8, 0.8, 0.8, 1.0))
 SECTION_NAMES = ("objects", "materials", "lights", "cameras")
+_WORDS = {"ease": scene_keys.EASE, "slerp": scene_keys.SLERP}
+"""Keys among the times of keyframes."""
 _GENERATED = ("base_color", "normal", "metallic_roughness", "occlusion")
 _SRGB = ("base_color", "emissive", "specular_color", "sheen_color")
 
 
-def read_scene(path: Path | None, reading: Reading, changes: Value | None = None) -> Scene:
+def read_scene(path: Path | None, reading: Reading, changes: Value | None = None) -> model.Scene:
     """Read a scene file, what it extends, and changes; raise all mistakes, but only the first of a mesh file."""
     validator = Validator(scene_keys.CODES)
     root = Value({}, Source("scene")) if path is None else _extended(path, reading, validator, ())
@@ -118,7 +106,7 @@ def _by_place(problem: Problem) -> tuple[bool, str, int, int]:
 class _File(Struct):
     """A mesh file that has been read, with the indices of its meshes, materials and rig in the scene."""
 
-    scene: Scene
+    scene: model.Scene
     first_mesh: int
     first_material: int
     rig: int | None
@@ -130,40 +118,38 @@ class _Reader:
     def __init__(self, path: Path, reading: Reading, validator: Validator) -> None:
         self.path, self.reading, self.validator = path, reading, validator
         self.recipe: dict[tuple[str, str], dict[str, Any]] = {}
-        self.objects: list[Object] = []
-        self.meshes: list[Mesh] = []
-        self.materials: list[Material] = []
-        self.lights: list[Light] = []
-        self.cameras: dict[str, Camera] = {}
-        self.placements: dict[str, Placement] = {}
+        self.objects: list[model.Object] = []
+        self.meshes: list[model.Mesh] = []
+        self.materials: list[model.Material] = []
+        self.lights: list[model.Light] = []
+        self.cameras: dict[str, model.Camera] = {}
+        self.placements: dict[str, model.Placement] = {}
         self.copies: dict[tuple[str, str], Copies] = {}
         self.shapes: dict[tuple[Any, ...], tuple[int, list[ShapePart]]] = {}
         self.files: dict[tuple[Any, ...], _File] = {}
-        self.mesh_files: dict[Path, Scene] = {}
+        self.mesh_files: dict[Path, model.Scene] = {}
         self.rigs: list[Rig] = []
         self.material_numbers: dict[str | None, int] = {}
         self.names: dict[str, tuple[str, ...]] = {}
-        self.table, self.sections = scene_keys.SCENE, scene_keys.SECTIONS
+        self.sections: Mapping[str, Table] = scene_keys.SECTIONS
         self.plugin_keys: dict[str, frozenset[str]] = {}
         self.kinds: Mapping[str, TextureKind] = SHIPPED_TEXTURES
         self.vertices = 0
         self.ground: float | None = None
         self.variants: dict[str, dict[int, int]] = {}
 
-    def read(self, root: Value) -> Scene:
+    def read(self, root: Value) -> model.Scene:
         """Return the scene, which may be used only if no problem was found."""
-        self.names = names = {section: tuple(_entries(root, section)) for section in SECTION_NAMES}
-        self._add_plugin_keys(root)
-        top = self.validator.file(root, self.table, "`scene: 1` and `objects`")
+        self.names = {section: tuple(_entries(root, section)) for section in SECTION_NAMES}
+        top = self.validator.file(root, self._table(root), "`scene: 1` and `objects`")
         if top is None:
-            return Scene(self.path.stem)
-        for section, read in (("materials", self._material), ("lights", self._light), ("cameras", self._camera)):
+            return model.Scene(self.path.stem)
+        readers = {"materials": self._material, "lights": self._light, "cameras": self._camera, "objects": self._object}
+        for section, read in readers.items():
             for name, entry in _entries(top, section).items():
                 read(name, entry)
-        for name, entry in _entries(top, "objects").items():
-            self._object(name, entry, names["materials"])
         environment = self._environment(top.get("environment"))
-        scene = Scene(
+        scene = model.Scene(
             self.path.stem,
             self.path,
             tuple(self.objects),
@@ -172,7 +158,7 @@ class _Reader:
             tuple(self.lights),
             self.cameras,
             environment,
-            self._keyframes(top, names),
+            self._keyframes(top),
             self._orbit(top.get("orbit")),
             recipe=self.recipe,
             placements=self.placements,
@@ -189,57 +175,45 @@ class _Reader:
         """Return by camera the objects that it follows: a name under `objects`, or that of a copy."""
         found = {}
         for name, entry in _entries(top, "cameras").items():
-            self._check_name(entry, "follow", self.placements, "objects")
+            self._check_name(entry.get("follow"), "objects", self.placements)
             placement = self.placements.get(str(self.recipe["cameras", name].get("follow")))
             if placement is not None:
                 found[name] = tuple(index for index, _ in placement.objects)
         return found
 
-    def _add_plugin_keys(self, root: Value) -> None:
-        """Add keys of plugins if the file has keys that are not rendergraph's own."""
+    def _table(self, root: Value) -> Table:
+        """Return the table of the file, with keys of plugins if it has keys that are not rendergraph's own."""
         asked = _unknown_keys(root)
         if has_unknown_kinds := not _kinds(root) <= self.kinds.keys():
             self.kinds = {**self.kinds, **self.reading.extensions.textures()}
         if not any(asked.values()) and not has_unknown_kinds:
-            return
+            return scene_keys.SCENE
         self.sections = scene_keys.with_plugins(self.reading.extensions, asked, self.kinds)
-        self.table = scene_keys.scene_table(self.sections)
-        own = scene_keys.SECTIONS
-        for section, table in self.sections.items():
-            self.plugin_keys[section] = frozenset(key.name for key in table.keys[len(own[section].keys) :])
-        known = self.plugin_keys
-        is_known = all(names <= known[section] for section, names in asked.items())
+        for section, own in scene_keys.SECTIONS.items():
+            self.plugin_keys[section] = frozenset(key.name for key in self.sections[section].keys[len(own.keys) :])
+        is_known = all(names <= self.plugin_keys[section] for section, names in asked.items())
         if not is_known or not _kinds(root) <= self.kinds.keys():
             self.validator.problems += self.reading.extensions.problems
+        return scene_keys.scene_table(self.sections)
 
     def _plain(self, section: str, entry: Value) -> dict[str, Any]:
         """Return the values of an entry, with those of plugins' keys in its `extra`, where images are opened."""
-        return self._split(section, entry, plain(entry, self.sections[section]))
-
-    def _split(self, section: str, entry: Value, values: dict[str, Any]) -> dict[str, Any]:
+        values: dict[str, Any] = plain(entry, self.sections[section])
         added = {key: values.pop(key) for key in self.plugin_keys.get(section, frozenset()) & values.keys()}
-        if added:
-            values["extra"] = Extra(self._opened(section, entry, added))
-        return values
-
-    def _opened(self, section: str, entry: Value, added: dict[str, Any]) -> dict[str, Any]:
-        for key in self.sections[section].keys:
+        for key in self.sections[section].keys if added else ():
             if key.name in added and key.type is FILE:
-                place = _value(entry, key.name)
                 del added[key.name]
-                with self._reading_file(place):
-                    added[key.name] = self._image(place)
-        return added
+                with self._reading_file(entry.mapping[key.name]):
+                    added[key.name] = self._image(entry.mapping[key.name])
+        return values | {"extra": Extra(added)} if added else values
 
-    def _check_name(self, entry: Value, key: str, known: Iterable[str], section: str) -> None:
-        value = entry.get(key)
-        if value is not None and value.data is not None:
-            self._check_text(value, section.removesuffix("s"), known, section)
-
-    def _check_text(self, value: Value, what: str, known: Iterable[str], section: str) -> None:
-        if str(value.data) not in known:
+    def _check_name(self, value: Value | None, section: str, known: Iterable[str] | None = None) -> None:
+        """Report the name of an entry that a section does not have."""
+        known = self.names[section] if known is None else known
+        if value is not None and value.data is not None and str(value.data) not in known:
             hint = suggestion(str(value.data), known) or f"; there are no {section}"
-            self.validator.report(value, "RG322", f"there is no {what} '{shown(value.data)}'{hint}")
+            text = f"there is no {section.removesuffix('s')} '{shown(value.data)}'{hint}"
+            self.validator.report(value, "RG322", text)
 
     @contextmanager
     def _reading_file(self, place: Value) -> Iterator[None]:
@@ -262,17 +236,17 @@ class _Reader:
         for key, _ in scene_keys.TEXTURES:
             if key in values:
                 slot = key.removesuffix("_texture")
-                place, file = _value(entry, key), values.pop(key)
+                place, file = entry.mapping[key], values.pop(key)
                 if isinstance(file, dict):
                     textures |= {slot: self._generated(slot, file)} if "kind" in file else {}
                     continue
                 with self._reading_file(place):
-                    textures[slot] = Texture(self._image(place), slot in _SRGB)
+                    textures[slot] = model.Texture(self._image(place), slot in _SRGB)
         self.recipe["materials", name] = values
         self.material_numbers[name] = len(self.materials)
         self.materials.append(scene_values.material(name, values, textures))
 
-    def _generated(self, slot: str, values: Mapping[str, Any]) -> Texture:
+    def _generated(self, slot: str, values: Mapping[str, Any]) -> model.Texture:
         """Return one slot's map of a generated texture."""
         kind = self.kinds[values["kind"]]
         given = {"seed": 0, "resolution": 512, **{key.name: key.default for key in kind.keys}, **values}
@@ -280,9 +254,9 @@ class _Reader:
         name, size = given.pop("kind"), (given["resolution"],) * 2
         which: Any = "color" if slot in _SRGB else "normal" if slot.endswith("normal") else "surface"
         record_read(Path(kind.shader))
-        made = GeneratedTexture(Path(kind.shader), tuple(given.items()), which)
-        image = ImageSource(made.shader, None, f"texture {name}", None, size, 4, made)
-        return Texture(image, slot in _SRGB, transform=None if rate == 1 else (rate, 0.0, 0.0, 0.0, rate, 0.0))
+        made = model.GeneratedTexture(Path(kind.shader), tuple(given.items()), which)
+        image = model.ImageSource(made.shader, None, f"texture {name}", None, size, 4, made)
+        return model.Texture(image, slot in _SRGB, transform=None if rate == 1 else (rate, 0.0, 0.0, 0.0, rate, 0.0))
 
     def _light(self, name: str, entry: Value) -> None:
         self.recipe["lights", name] = values = self._plain("lights", entry)
@@ -302,7 +276,7 @@ class _Reader:
         repeat = values.pop("repeat", None)
         if not repeat:
             return None
-        place = _value(entry, "repeat")
+        place = entry.mapping["repeat"]
         for other in self.names[section]:
             if other.startswith(f"{name}.") and other.removeprefix(f"{name}.").isdigit():
                 text = f"'{shown(other)}' is the name of a copy of '{shown(name)}'; rename one"
@@ -312,8 +286,8 @@ class _Reader:
         found = Copies(np.zeros((0, 3)))
         columns: dict[str, Any] = {}
         if "file" in repeat:
-            with self._reading_file(_value(place, "file")):
-                columns = self._columns(section, _value(place, "file"), most)
+            with self._reading_file(place.mapping["file"]):
+                columns = self._columns(section, place.mapping["file"], most)
         with self._reading_file(place):
             count = len(next(iter(columns.values()))) if columns else count_of(repeat)
             if count > most:
@@ -340,17 +314,17 @@ class _Reader:
             self.validator.report(entry, "RG321", f"camera '{shown(name)}': {problem}", key=True)
             self.cameras[name] = scene_values.camera(name, {})
 
-    def _orbit(self, entry: Value | None) -> Orbit | None:
+    def _orbit(self, entry: Value | None) -> model.Orbit | None:
         if entry is None or entry.data is None:
             return None
-        self._check_name(entry, "camera", self.cameras, "cameras")
+        self._check_name(entry.get("camera"), "cameras", self.cameras)
         values = plain(entry, scene_keys.ORBIT)
-        return Orbit(values.get("camera", ""), values.get("degrees_per_second", 30.0))
+        return model.Orbit(values.get("camera", ""), values.get("degrees_per_second", 30.0))
 
-    def _environment(self, entry: Value | None) -> Environment | None:
-        values = plain(entry, scene_keys.ENVIRONMENT) if entry is not None else {}
+    def _environment(self, entry: Value | None) -> model.Environment | None:
         if entry is None:
             return None
+        values = plain(entry, scene_keys.ENVIRONMENT)
         if values.get("ground"):
             self.ground = values.get("ground_height", 0.0)
         if "file" not in values:
@@ -360,14 +334,14 @@ class _Reader:
                 self.validator.report(key or entry, "RG321", "environment needs 'file', or `ground: true` alone")
             return None
         self.recipe["environment", ""] = values
-        place, file = _value(entry, "file"), values["file"]
+        place, file = entry.mapping["file"], values["file"]
         if not self._check_sky(entry, file, values):
             return None
         with self._reading_file(place):
             environment = named(file, self.lights, values)
             if environment is None:
                 image = self._image(place)
-                environment = Environment(image, image.size)
+                environment = model.Environment(image, image.size)
             turn = math.radians(values.get("rotate_degrees", 0.0))
             return replace(environment, intensity=values.get("intensity", 1.0), rotate=turn)
         return None
@@ -391,11 +365,11 @@ class _Reader:
             self.validator.report(given[key], "RG321", text, key=True)
         return not wrong
 
-    def _object(self, name: str, entry: Value, materials: Sequence[str]) -> None:
-        self._check_name(entry, "material", materials, "materials")
+    def _object(self, name: str, entry: Value) -> None:
+        self._check_name(entry.get("material"), "materials")
         values = self._plain("objects", entry)
         for choice in _listed(entry.get("repeat", "choose", "material")):
-            self._check_text(choice, "material", materials, "materials")
+            self._check_name(choice, "materials")
         copied = self._copies("objects", name, entry, values)
         keys = ["extra", *(key.name for key in scene_keys.OBJECT.keys)]
         self.recipe["objects", name] = {key: values[key] for key in keys if key in values}
@@ -407,10 +381,9 @@ class _Reader:
         if "shape" in values:
             self._shape(name, entry, values, each)
         elif "file" in values:
-            place = _value(entry, "file")
-            with self._reading_file(place):
+            with self._reading_file(entry.mapping["file"]):
                 file = self._read_file(name, values["file"], entry)
-                overrides = self._overrides(_entries(entry, "overrides"), name, file.scene, materials)
+                overrides = self._overrides(_entries(entry, "overrides"), name, file.scene)
                 self._check_count(entry, len(each) * len(file.scene.objects))
                 for copy, matrix, material in each:
                     self._file(copy, matrix, file, values | {"material": material}, overrides)
@@ -430,7 +403,7 @@ class _Reader:
         return self.material_numbers[name]
 
     def _shape(
-        self, name: str, entry: Value, values: dict[str, Any], placed: Sequence[tuple[str, Matrix, str | None]]
+        self, name: str, entry: Value, values: dict[str, Any], placed: Sequence[tuple[str, model.Matrix, str | None]]
     ) -> None:
         """Add the copies of a shape, which share its mesh; copies with the same material also share its parts."""
         shape = values["shape"]
@@ -459,11 +432,16 @@ class _Reader:
                     material = made[base, part.suffix]
                 transform = world @ part.local
                 rest = casts_shadow, hidden, copy, values.get("extra", NO_EXTRA)
-                self.objects.append(Object(copy + part.suffix, mesh, material, transform, *rest))
-            self.placements[copy] = Placement(tuple((first + k, part.local) for k, part in enumerate(parts)))
+                self.objects.append(model.Object(copy + part.suffix, mesh, material, transform, *rest))
+            self.placements[copy] = model.Placement(tuple((first + k, part.local) for k, part in enumerate(parts)))
 
     def _file(
-        self, name: str, world: Matrix, file: _File, values: dict[str, Any], overrides: Mapping[str, dict[str, Any]]
+        self,
+        name: str,
+        world: model.Matrix,
+        file: _File,
+        values: dict[str, Any],
+        overrides: Mapping[str, dict[str, Any]],
     ) -> None:
         scene = file.scene
         objects, lights, cameras = [], [], []
@@ -477,7 +455,7 @@ class _Reader:
                     self.variants.setdefault(variant, {})[len(self.objects)] = materials[number] + file.first_material
             objects.append((len(self.objects), part.transform))
             self.objects.append(
-                Object(
+                model.Object(
                     f"{name}/{part.name}",
                     part.mesh + file.first_mesh,
                     part.material + file.first_material if material is None else self._material_index(material),
@@ -497,7 +475,7 @@ class _Reader:
             camera_name = f"{name}/{camera.name}"
             cameras.append((camera_name, scene.placements[""].cameras[number][1] if scene.rigs else camera.transform))
             self.cameras[camera_name] = replace(camera, name=camera_name, transform=rigid(world @ camera.transform))
-        self.placements[name] = Placement(tuple(objects), tuple(lights), tuple(cameras))
+        self.placements[name] = model.Placement(tuple(objects), tuple(lights), tuple(cameras))
 
     def _resolve(self, place: Value) -> Path:
         """Return the path written at a place; the user's own may be anywhere."""
@@ -508,11 +486,11 @@ class _Reader:
             return inside(source.path.parent)(source.path.parent / file, place.place)
         return self.reading.resolve(file, line=place.line, file=source.path or Path("x"))
 
-    def _image(self, place: Value) -> ImageSource:
+    def _image(self, place: Value) -> model.ImageSource:
         return self.reading.image(self._resolve(place), "image", line=place.line)
 
     def _read_file(self, name: str, file: str, entry: Value) -> _File:
-        path = self._resolve(_value(entry, "file"))
+        path = self._resolve(entry.mapping["file"])
         if path not in self.mesh_files:
             if path.suffix.lower() in MESHES:
                 self.reading.check_file(path, "file")
@@ -536,7 +514,7 @@ class _Reader:
             self.materials += [replace(material, name=f"{name}/{material.name}") for material in scene.materials]
         return self.files[key]
 
-    def _playback(self, name: str, entry: Value, scene: Scene) -> dict[str, Any] | None:
+    def _playback(self, name: str, entry: Value, scene: model.Scene) -> dict[str, Any] | None:
         """Return the clip that an object plays, and its speed and start; None at rest."""
         if (place := entry.get("animation")) is None or place.data is None:
             return None
@@ -551,79 +529,62 @@ class _Reader:
         self.validator.report(place.get("clip") or place, "RG322", text)
         return None
 
-    def _overrides(
-        self, entries: Mapping[str, Value], name: str, scene: Scene, materials: Sequence[str]
-    ) -> dict[str, dict[str, Any]]:
+    def _overrides(self, entries: Mapping[str, Value], name: str, scene: model.Scene) -> dict[str, dict[str, Any]]:
         """Return the changed values by name of node or part."""
         known = dict.fromkeys(word for part in scene.objects for word in (part.node, part.name))
         for node, entry in entries.items():
             if node not in known:
                 text = f"object '{shown(name)}': its file has no node '{shown(node)}'{suggestion(node, known)}"
                 self.validator.report(entry, "RG322", text, key=True)
-            self._check_name(entry, "material", materials, "materials")
-        override = self.sections["objects"].alternatives["file"]
-        assert isinstance(override, tuple)
-        assert isinstance(override[0].type, MapOf)
-        return {
-            node: self._split("objects", entry, plain(entry, override[0].type.of)) for node, entry in entries.items()
-        }
+            self._check_name(entry.get("material"), "materials")
+        return {node: self._plain("objects", entry) for node, entry in entries.items()}
 
-    def _keyframes(self, top: Value, names: dict[str, tuple[str, ...]]) -> dict[str, Curve]:
+    def _keyframes(self, top: Value) -> dict[str, Curve]:
         result = {}
         for path, entry in _entries(top, "keyframes").items():
-            key = self._named_key(str(path), entry, names)
+            key = self._named_key(str(path), entry)
             if key is None:
                 continue
-            if not isinstance(entry.data, dict) or not entry.data:
-                what = "empty" if entry.data == {} else entry.kind
-                text = f"keyframes of '{shown(path)}' are {what}, not a mapping of seconds to values"
-                self.validator.report(entry, "RG321", text)
+            what = f"keyframes of '{shown(path)}'"
+            if not entry.mapping:
+                kind = "empty" if entry.data == {} else entry.kind
+                self.validator.report(entry, "RG321", f"{what} are {kind}, not a mapping of seconds to values")
                 continue
-            frames = []
+            frames: list[tuple[float, Any]] = []
             words: dict[str, Any] = {}
             for time, value in entry.items():
-                if time in ("ease", "slerp"):
-                    word = scene_keys.EASE if time == "ease" else scene_keys.SLERP
-                    if (good := self.validator.value(value, word)) is not None:
-                        words[time] = plain(good, word.type)
-                    continue
-                if isinstance(time, bool) or not isinstance(time, int | float) or not math.isfinite(time):
-                    text = f"keyframes of '{shown(path)}': '{shown(time)}' is not a time in seconds, `ease` or `slerp`"
+                if time in _WORDS:
+                    if (good := self.validator.value(value, _WORDS[time])) is not None:
+                        words[time] = plain(good, _WORDS[time].type)
+                elif isinstance(time, bool) or not isinstance(time, int | float) or not math.isfinite(time):
+                    text = f"{what}: '{shown(time)}' is not a time in seconds, `ease` or `slerp`"
                     self.validator.report(value, "RG321", text, key=True)
-                    continue
-                if value.data is None:
+                elif value.data is None:
                     self.validator.report(value, "RG321", f"keyframe {time:g} s of '{shown(path)}' has no value")
                 elif (good := self.validator.value(value, key)) is not None:
                     frames.append((float(time), plain(good, key.type)))
-            if curve := self._curve(path, entry, sorted(frames, key=lambda frame: frame[0]), words):
-                result[path] = curve
+            turns = words.get("slerp", False)
+            if turns and not (path.startswith("objects.") and path.endswith(".rotate_degrees")):
+                text = f"{what}: 'slerp' is for the 'rotate_degrees' of objects"
+                self.validator.report(entry.mapping["slerp"], "RG321", text, key=True)
+            elif len({np.shape(value) for _, value in frames}) > 1:
+                self.validator.report(entry, "RG321", f"{what} are of different lengths")
+            elif frames:
+                times, values = zip(*sorted(frames, key=itemgetter(0)), strict=True)
+                values = np.array([quaternion(np.array(value)) for value in values] if turns else values, np.float64)
+                ease = words.get("ease", "linear")
+                result[path] = Curve(np.array(times), values, ease, turns, entry.key_place)
+            elif entry.mapping.keys() <= _WORDS.keys():
+                self.validator.report(entry, "RG321", f"{what} have no times")
         return result
 
-    def _curve(
-        self, path: str, entry: Value, frames: list[tuple[float, Any]], words: Mapping[str, Any]
-    ) -> Curve | None:
-        """Return the values over time; None after a mistake."""
-        turns = words.get("slerp", False)
-        if turns and not (path.startswith("objects.") and path.endswith(".rotate_degrees")):
-            text = f"keyframes of '{shown(path)}': 'slerp' is for the 'rotate_degrees' of objects"
-            self.validator.report(_value(entry, "slerp"), "RG321", text, key=True)
-        elif len({np.shape(value) for _, value in frames}) > 1:
-            self.validator.report(entry, "RG321", f"keyframes of '{shown(path)}' are of different lengths")
-        elif frames:
-            values = [quaternion(np.array(value)) if turns else value for _, value in frames]
-            times = np.array([time for time, _ in frames])
-            return Curve(times, np.array(values, np.float64), words.get("ease", "linear"), turns, entry.key_place)
-        elif all(time in ("ease", "slerp") for time, _ in entry.items()):
-            self.validator.report(entry, "RG321", f"keyframes of '{shown(path)}' have no times")
-        return None
-
-    def _named_key(self, path: str, entry: Value, names: dict[str, tuple[str, ...]]) -> Key | None:
+    def _named_key(self, path: str, entry: Value) -> Key | None:
         """Return the key that a dotted path names; only numbers, vectors and colours can be animated."""
         section, _, rest = path.partition(".")
         name, key = ("", rest) if section == "environment" else rest.rpartition(".")[::2]
         if section == "nodes" and name and key:  # checked when the pipeline is known
             return scene_keys.NODE_VALUE
-        known = names.get(section, ())
+        known = self.names.get(section, ())
         moving: dict[str, Key] = {}
         if section == "nodes":
             text = f"keyframes: '{shown(path)}' names no parameter of a node; write nodes.ID.PARAM"
@@ -673,9 +634,3 @@ def _entries(value: Value, section: str) -> dict[str, Value]:
 
 def _listed(value: Value | None) -> list[Value]:
     return value.data if value is not None and isinstance(value.data, list) else []
-
-
-def _value(entry: Value, key: str) -> Value:
-    value = entry.get(key)
-    assert value is not None  # checked by the caller
-    return value
