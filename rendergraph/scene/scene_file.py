@@ -55,7 +55,7 @@ def read_scene(path: Path | None, reading: Reading, changes: Value | None = None
         _check_names(root, changes, whole, validator)
         root = whole
         root = root.updated({"scene": Value(1, root.source)}) if "scene" not in root.mapping else root
-    reader = _Reader(reading.path, reading, Validator(scene_keys.CODES, validator.problems))
+    reader = _Reader(reading, Validator(scene_keys.CODES, validator.problems))
     scene = reader.read(root)
     if reader.validator.problems:
         raise InputError(sorted(reader.validator.problems, key=_by_place))
@@ -115,8 +115,8 @@ class _File(Struct):
 class _Reader:
     """Reads the sections in the order of their references to each other."""
 
-    def __init__(self, path: Path, reading: Reading, validator: Validator) -> None:
-        self.path, self.reading, self.validator = path, reading, validator
+    def __init__(self, reading: Reading, validator: Validator) -> None:
+        self.path, self.reading, self.validator = reading.path, reading, validator
         self.recipe: dict[tuple[str, str], dict[str, Any]] = {}
         self.objects: list[model.Object] = []
         self.meshes: list[model.Mesh] = []
@@ -436,12 +436,7 @@ class _Reader:
             self.placements[copy] = model.Placement(tuple((first + k, part.local) for k, part in enumerate(parts)))
 
     def _file(
-        self,
-        name: str,
-        world: model.Matrix,
-        file: _File,
-        values: dict[str, Any],
-        overrides: Mapping[str, dict[str, Any]],
+        self, name: str, world: model.Matrix, file: _File, values: dict[str, Any], overrides: dict[str, dict[str, Any]]
     ) -> None:
         scene = file.scene
         objects, lights, cameras = [], [], []
@@ -571,9 +566,8 @@ class _Reader:
                 self.validator.report(entry, "RG321", f"{what} are of different lengths")
             elif frames:
                 times, values = zip(*sorted(frames, key=itemgetter(0)), strict=True)
-                values = np.array([quaternion(np.array(value)) for value in values] if turns else values, np.float64)
-                ease = words.get("ease", "linear")
-                result[path] = Curve(np.array(times), values, ease, turns, entry.key_place)
+                turned = np.array([quaternion(np.array(value)) for value in values] if turns else values, np.float64)
+                result[path] = Curve(np.array(times), turned, words.get("ease", "linear"), turns, entry.key_place)
             elif entry.mapping.keys() <= _WORDS.keys():
                 self.validator.report(entry, "RG321", f"{what} have no times")
         return result
