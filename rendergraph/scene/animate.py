@@ -110,8 +110,9 @@ def baked(scene: Scene) -> Scene:
 
 def moving_plugin_keys(scene: Scene) -> set[str]:
     """Return the sections in which keyframes change plugins' keys."""
-    paths = [(path.partition(".")[0], path.rpartition(".")[2]) for path in scene.keyframes if scene.plugin_keys]
-    return {section for section, key in paths if key in scene.plugin_keys.get(section, ())}
+    return {
+        section for section, _, curves in scene.tracks for key, _ in curves if key in scene.plugin_keys.get(section, ())
+    }
 
 
 def at(scene: Scene, time_s: float) -> Scene:

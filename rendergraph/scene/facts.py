@@ -12,21 +12,10 @@ import numpy.typing as npt
 
 from rendergraph.declare import CameraFacts, LightFacts, MaterialFacts
 from rendergraph.facts import SELECTIONS, ObjectFacts
-from rendergraph.scene.model import (
-    Camera,
-    ImageSource,
-    Light,
-    Material,
-    Mesh,
-    Object,
-    Scene,
-    Vec3,
-    boxes_of,
-    changed_objects,
-)
+from rendergraph.scene import model
+from rendergraph.scene.model import ImageSource, Matrix, Scene, bounds_of, changed_objects, corners_of
 from rendergraph.textures import TextureDesc, full_mip_count
 
-Corners: TypeAlias = npt.NDArray[np.float64]
 Decode: TypeAlias = Callable[[ImageSource, bool], npt.NDArray[Any]]
 """Image to (height, width, 4) uint8 or floats, top row first; the flag says that colours are sRGB."""
 
@@ -109,28 +98,29 @@ class FrameScene:
         moved = changed_objects(before.placed, scene)
         self.corners = before.corners.copy()
         self.corners[moved] = corners_of(self.meshes, [self.objects[number] for number in moved])
-        if all(_flags(before.placed.objects[number]) == _flags(self.objects[number]) for number in moved):
+        flags = attrgetter("hidden", "casts_shadow")
+        if all(flags(before.placed.objects[number]) == flags(self.objects[number]) for number in moved):
             self.shown, self.casting = before.shown, before.casting
 
     # `scene` is replaced even if no object moves, because lights may have changed.
     @property
-    def lights(self) -> tuple[Light, ...]:
+    def lights(self) -> tuple[model.Light, ...]:
         return self.scene.lights
 
     @property
-    def objects(self) -> tuple[Object, ...]:
+    def objects(self) -> tuple[model.Object, ...]:
         return self.scene.objects
 
     @property
-    def materials(self) -> tuple[Material, ...]:
+    def materials(self) -> tuple[model.Material, ...]:
         return self.scene.materials
 
     @property
-    def meshes(self) -> tuple[Mesh, ...]:
+    def meshes(self) -> tuple[model.Mesh, ...]:
         return self.scene.meshes
 
     @property
-    def camera(self) -> Camera:
+    def camera(self) -> model.Camera:
         assert self.scene.camera is not None  # `complete` has added one
         return self.scene.camera
 
@@ -140,7 +130,7 @@ class FrameScene:
         return found.astype(np.float32) / np.float32(255 if found.dtype == np.uint8 else 1)
 
     @cached_property
-    def corners(self) -> Corners:
+    def corners(self) -> Matrix:
         """World-space corners of the objects' boxes, (n, 8, 3), z fastest."""
         return corners_of(self.meshes, self.objects)
 
@@ -158,26 +148,9 @@ class FrameScene:
         return np.array([number for number in numbers if self.shown[number]], np.int64)
 
     @cached_property
-    def bounds(self) -> tuple[Vec3, Vec3]:
+    def bounds(self) -> tuple[model.Vec3, model.Vec3]:
         counts = self.shown
         if len(self.catchers):
             counts = counts.copy()
             counts[self.catchers] = False
-        shown = self.corners if counts.all() else self.corners[counts]
-        if not len(shown):
-            return (-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)
-        (x, y, z), (u, v, w) = shown.min(axis=(0, 1)).tolist(), shown.max(axis=(0, 1)).tolist()
-        return (x, y, z), (u, v, w)
-
-
-def corners_of(meshes: tuple[Mesh, ...], objects: tuple[Object, ...] | list[Object]) -> Corners:
-    transforms = np.array([entry.transform for entry in objects]).reshape(-1, 4, 4)
-    low, high = boxes_of(meshes, objects)
-    far = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], bool)
-    local = np.where(far, high[:, None], low[:, None])
-    placed: Corners = local @ transforms[:, :3, :3].swapaxes(1, 2) + transforms[:, None, :3, 3]
-    return placed
-
-
-def _flags(entry: Object) -> tuple[bool, bool]:
-    return entry.hidden, entry.casts_shadow
+        return bounds_of(self.corners if counts.all() else self.corners[counts])

@@ -40,7 +40,6 @@ FARTHEST = 1e12
 """Limit of numbers in a mesh: products of a few larger ones would exceed single precision."""
 
 _LAYERED = ("clearcoat", "sheen_color", "iridescence", "transmission", "shadow_catcher")
-_LAYERS = {key: key.removesuffix("_color") for key in _LAYERED}
 _REFLECTANCE = ("ior", "specular", "specular_color")
 _MOST_CONVEX = 10_000_000
 """Limit of pairs of vertex and triangle in the test for convexity: about a tenth of a second."""
@@ -463,14 +462,7 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         """
         catchers = set(self.catchers)
         shown = [entry for number, entry in enumerate(self.objects) if not entry.hidden and number not in catchers]
-        if not shown:
-            return (-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)
-        transforms, (low, high) = np.array([entry.transform for entry in shown]), boxes_of(self.meshes, shown)
-        center = np.einsum("nij,nj->ni", transforms[:, :3, :3], (low + high) / 2) + transforms[:, :3, 3]
-        extent = np.einsum("nij,nj->ni", np.abs(transforms[:, :3, :3]), (high - low) / 2)
-        low, high = extremes(np.concatenate([center - extent, center + extent]))
-        (x, y, z), (u, v, w) = low.tolist(), high.tolist()
-        return (x, y, z), (u, v, w)
+        return bounds_of(corners_of(self.meshes, shown))
 
     @cached_property
     def tracks(self) -> tuple[tuple[str, str, tuple[tuple[str, Curve], ...]], ...]:
@@ -499,8 +491,8 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
 
     def layers(self, material: Material) -> tuple[str, ...]:
         """Return which of clearcoat, sheen, iridescence and transmission a material has at any time."""
-        has = {key: np.any(getattr(material, key)) or self._changes(material, key) for key in _LAYERS}
-        return () if material.unlit else tuple(_LAYERS[key] for key in _LAYERS if has[key])
+        has = (key for key in _LAYERED if np.any(getattr(material, key)) or self._changes(material, key))
+        return () if material.unlit else tuple(key.removesuffix("_color") for key in has)
 
     def is_blended(self, material: Material) -> bool:
         """Return whether a material lets surfaces behind it show, by alpha or transmission."""
@@ -524,12 +516,24 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         return f"<Scene {self.name}: {counts}>"
 
 
-def boxes_of(meshes: tuple[Mesh, ...], objects: Sequence[Object]) -> Matrix:
-    """Return the object-space boxes of objects, (2, n, 3)."""
+def corners_of(meshes: Sequence[Mesh], objects: Sequence[Object]) -> Matrix:
+    """Return the world-space corners of the boxes of objects, (n, 8, 3), z fastest."""
     used = {key: place for place, key in enumerate(dict.fromkeys((entry.mesh, entry.pose) for entry in objects))}
-    boxes = [meshes[mesh].box if pose is None else pose.box for mesh, pose in used]
-    found = np.array(boxes, np.float64).reshape(-1, 2, 3)
-    return found[[used[entry.mesh, entry.pose] for entry in objects]].reshape(-1, 2, 3).swapaxes(0, 1)
+    boxes = np.array([meshes[mesh].box if pose is None else pose.box for mesh, pose in used], np.float64)
+    low, high = boxes.reshape(-1, 2, 3)[[used[entry.mesh, entry.pose] for entry in objects]].swapaxes(0, 1)
+    far = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], bool)
+    transforms = np.array([entry.transform for entry in objects]).reshape(-1, 4, 4)
+    local = np.where(far, high[:, None], low[:, None])
+    placed: Matrix = local @ transforms[:, :3, :3].swapaxes(1, 2) + transforms[:, None, :3, 3]
+    return placed
+
+
+def bounds_of(corners: Matrix) -> tuple[Vec3, Vec3]:
+    """Return the minimum and maximum corner of boxes (n, 8, 3); a unit cube around the origin if there are none."""
+    if not len(corners):
+        return (-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)
+    (x, y, z), (u, v, w) = (corner.tolist() for corner in extremes(corners.reshape(-1, 3)))
+    return (x, y, z), (u, v, w)
 
 
 def changed_objects(before: Scene, scene: Scene) -> list[int]:

@@ -94,7 +94,7 @@ def stack_size(scene: Scene) -> int:
 
 def _moving(scene: Scene) -> set[int]:
     """Return the objects whose position or shape changes over time."""
-    names = {path.partition(".")[2].rpartition(".")[0] for path in scene.keyframes if path.startswith("objects.")}
+    names = {name for section, name, _ in scene.tracks if section == "objects"}
     for name in list(names):
         if (copies := scene.copies.get(("objects", name))) is not None:
             names.update(f"{name}.{number}" for number in range(len(copies.offsets)))
