@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +16,8 @@ from rendergraph.steps import ViewMatrices
 if TYPE_CHECKING:
     from rendergraph.scene.rig import Pose
 
-FRAMING_DIRECTION = (1.0, 0.6, 1.5)
+_AXES = projection.look_at((1.0, 0.6, 1.5), (0.0, 0.0, 0.0))[:3, :3].T
+"""Axes of the camera that frames a scene, as rows: right, up, towards the viewer."""
 FRAMING_FOV = math.radians(45.0)
 WIDE = 16 / 9
 MOST_POINTS = 1 << 24
@@ -64,14 +64,13 @@ def framing_camera(
         around: look at the centre, from a distance at which everything stays in the picture during a full turn.
     """
     center, radius = bounding_sphere(scene)
-    axes = _axes()
     tall = math.tan(FRAMING_FOV / 2) * _MARGIN
     wide = tall * aspect
     # Outward normals of the view's four sides, then the direction to the viewer, from camera axes to world axes.
-    sides = np.array([[1, 0, wide], [-1, 0, wide], [0, 1, tall], [0, -1, tall], [0, 0, 1]]) @ axes
+    sides = np.array([[1, 0, wide], [-1, 0, wide], [0, 1, tall], [0, -1, tall], [0, 0, 1]]) @ _AXES
     turns = np.eye(3)[None]
     if around:
-        turns = np.array([euler_matrix((0, degrees, 0)) for degrees in range(0, 360, 15)])
+        turns = euler_matrix([(0, degrees, 0) for degrees in range(0, 360, 15)])
     reaches = _reaches(scene, (sides @ turns).reshape(-1, 3), np.array(center), most_points).reshape(-1, 5)
     right, left, top, bottom, front = reaches.max(axis=0).tolist()
     if around:
@@ -80,9 +79,9 @@ def framing_camera(
     nearest = max(away - front, 1e-3 * radius)  # depth of the nearest point
     away = front + nearest
     transform = np.eye(4)
-    transform[:3, :3] = axes.T
-    transform[:3, 3] = eye = np.array([(right - left) / 2, (top - bottom) / 2, away]) @ axes + center
-    target = vec3(eye - axes[2] * away)
+    transform[:3, :3] = _AXES.T
+    transform[:3, 3] = eye = np.array([(right - left) / 2, (top - bottom) / 2, away]) @ _AXES + center
+    target = vec3(eye - _AXES[2] * away)
     near = min(0.1 * radius, 0.5 * nearest)
     return Camera("default", transform, fov_y=FRAMING_FOV, near=near, far=20 * radius, target=target)
 
@@ -90,12 +89,6 @@ def framing_camera(
 def lowest_point(scene: Scene) -> float:
     """Return the minimum y of everything drawn, in metres."""
     return -float(_reaches(scene, np.array([(0.0, -1.0, 0.0)]), np.zeros(3), MOST_POINTS)[0])
-
-
-@cache
-def _axes() -> npt.NDArray[np.float64]:
-    """Return the framing camera's axes as rows: right, up, towards the viewer."""
-    return projection.look_at(FRAMING_DIRECTION, (0.0, 0.0, 0.0))[:3, :3].T
 
 
 def _reaches(

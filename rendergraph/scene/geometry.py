@@ -80,13 +80,16 @@ def translation(at: npt.ArrayLike) -> Matrix:
     return matrix
 
 
-def euler_matrix(degrees: Sequence[float]) -> Matrix:
-    """Return the rotation (3, 3) about X, then Y, then Z (`Rz·Ry·Rx`), angles in degrees."""
-    (cx, cy, cz), (sx, sy, sz) = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    rx = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
-    ry = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    rz = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
-    return np.asarray(rz @ ry @ rx, np.float64)
+def euler_matrix(degrees: npt.ArrayLike) -> Matrix:
+    """Return rotations about X, then Y, then Z (`Rz·Ry·Rx`): (3, 3) of three angles in degrees, (n, 3, 3) of (n, 3)."""
+    angles = np.radians(np.asarray(degrees, np.float64).T)
+    (cx, cy, cz), (sx, sy, sz) = np.cos(angles), np.sin(angles)
+    rows = [
+        [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
+        [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
+        [-sy, cy * sx, cy * cx],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
 def placement(at: Sequence[float], rotation: Matrix, scale: Sequence[float]) -> Matrix:

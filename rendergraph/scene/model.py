@@ -27,8 +27,7 @@ from rendergraph.scene.edges import Edges, find_edges, is_solid
 from rendergraph.stamps import Stamps
 
 if TYPE_CHECKING:
-    from rendergraph.scene.curves import Curve
-    from rendergraph.scene.rig import Deform, Pose, Rig
+    from rendergraph.scene.rig import Curve, Deform, Pose, Rig
 
 Floats: TypeAlias = npt.NDArray[np.float32]
 Matrix: TypeAlias = npt.NDArray[np.float64]

@@ -14,6 +14,7 @@ from msgspec import Struct
 
 from rendergraph.errors import suggestion
 from rendergraph.projection import unit
+from rendergraph.scene.geometry import euler_matrix
 from rendergraph.scene.model import FARTHEST, Light, Matrix
 
 Doubles = npt.NDArray[np.float64]
@@ -83,26 +84,21 @@ def count_of(values: Mapping[str, Any]) -> int:
 
 
 def copies(values: Mapping[str, Any], columns: Mapping[str, Doubles]) -> Copies:
-    """Return the copies that `repeat` describes.
-
-    Args:
-        values: the keys of `repeat`.
-        columns: the columns of its file by key, (n, 1) or (n, 3); see `read_columns`.
-
-    Raises:
-        ValueError: keys contradict each other.
-    """
+    """Return the copies that the values of `repeat` describe, with the columns of its file (see `read_columns`)."""
     offsets, turns = _layout(values, columns)
     n, vary, seed = len(offsets), values.get("vary", {}), values.get("seed", 0)
     if "at" in vary:
         offsets = offsets + _random(seed, "at", (n, 3), signed=True) * vary["at"]
     if "rotate_degrees" in vary:
         angles = _random(seed, "rotate_degrees", (n, 3), signed=True) * vary["rotate_degrees"]
-        turns = turns @ _rotations(angles)
+        turns = turns @ euler_matrix(angles)
     if "scale" in vary:
         turns = turns * (1 + vary["scale"] * _random(seed, "scale", (n, 1, 1), signed=True))
-    found = {key: array[:, 0].tolist() if array.shape[1] == 1 else _tuples(array) for key, array in columns.items()}
-    kept: dict[str, Sequence[Any]] = {key: found[key] for key in ("color", "intensity", "range") if key in found}
+    kept: dict[str, Sequence[Any]] = {
+        key: columns[key][:, 0].tolist() for key in ("intensity", "range") & columns.keys()
+    }
+    if "color" in columns:
+        kept["color"] = _tuples(columns["color"])
     choose = dict(values.get("choose", {}))
     order = choose.pop("order", "random")
     picks = np.arange(n) if order == "turn" or not choose else _random(seed, "choose", (n,))
@@ -111,53 +107,38 @@ def copies(values: Mapping[str, Any], columns: Mapping[str, Doubles]) -> Copies:
         kept[key] = [choices[number] for number in index.tolist()]
     widths = {"color": 3, "intensity": 1}
     factors = {
-        key: 1 + vary[key] * _random(seed, key, (n, width), signed=True) for key, width in widths.items() if key in vary
+        key: 1 + vary[key] * _random(seed, key, (n, widths[key]), signed=True) for key in widths.keys() & vary.keys()
     }
-    is_turned = bool((turns != np.eye(3)).any())
-    return Copies(offsets, turns if is_turned else None, kept, factors)
+    return Copies(offsets, turns if (turns != np.eye(3)).any() else None, kept, factors)
 
 
 def _layout(values: Mapping[str, Any], columns: Mapping[str, Doubles]) -> tuple[Doubles, Doubles]:
-    """Return offsets (n, 3) and rotations (n, 3, 3) without random changes."""
+    """Return offsets (n, 3) and rotations without random changes, (n, 3, 3), or (1, 3, 3) for all."""
+    none = np.eye(3)[None]
     if "grid" in values:
         nx, ny, nz = values["grid"]
         number = np.arange(nx * ny * nz)
         cell = np.stack([number % nx, number // nx % ny, number // (nx * ny)], axis=-1).astype(np.float64)
         if values.get("centered", False):
             cell -= (np.array([nx, ny, nz]) - 1) / 2
-        return cell * values.get("step", (1.0, 1.0, 1.0)), _identities(len(cell))
+        return cell * values.get("step", (1.0, 1.0, 1.0)), none
     if "line" in values:
         n = values["line"]
-        return np.arange(n)[:, None] * np.array(values.get("step", (1.0, 0.0, 0.0))), _identities(n)
+        return np.arange(n)[:, None] * np.array(values.get("step", (1.0, 0.0, 0.0))), none
     if "ring" in values:
         n, arc = values["ring"], values.get("arc_degrees", 360.0)
         angles = values.get("start_degrees", 0.0) + np.linspace(0, arc, n, endpoint=abs(arc) < 360)
         radians = np.radians(angles)
         offsets = np.stack([np.cos(radians), np.zeros(n), -np.sin(radians)], axis=-1) * values.get("radius", 1.0)
         about_y = np.stack([np.zeros(n), angles, np.zeros(n)], axis=-1)
-        return offsets, _rotations(about_y) if values.get("turned", False) else _identities(n)
+        return offsets, euler_matrix(about_y) if values.get("turned", False) else none
     if "scatter" in values:
         n = values["scatter"]
         spread = _random(values.get("seed", 0), "at", (n, 3), purpose=1) - 0.5
-        return spread * values.get("size", (1.0, 1.0, 1.0)), _identities(n)
-    n = len(next(iter(columns.values())))
-    turns = _rotations(columns["rotate_degrees"]) if "rotate_degrees" in columns else _identities(n)
-    return columns.get("at", np.zeros((n, 3))), turns * columns["scale"][:, :, None] if "scale" in columns else turns
-
-
-def _identities(count: int) -> Doubles:
-    return np.repeat(np.eye(3)[None], count, axis=0)
-
-
-def _rotations(degrees: Doubles) -> Doubles:
-    """Return `geometry.euler_matrix` of each row, (n, 3, 3)."""
-    (cx, cy, cz), (sx, sy, sz) = np.cos(np.radians(degrees.T)), np.sin(np.radians(degrees.T))
-    rows = [
-        [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
-        [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
-        [-sy, cy * sx, cy * cx],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)
+        return spread * values.get("size", (1.0, 1.0, 1.0)), none
+    offsets = columns.get("at", np.zeros((len(next(iter(columns.values()))), 3)))
+    turns = euler_matrix(columns["rotate_degrees"]) if "rotate_degrees" in columns else none
+    return offsets, turns * columns["scale"][:, :, None] if "scale" in columns else turns
 
 
 def _tuples(array: Doubles) -> list[Any]:
@@ -179,11 +160,8 @@ def _random(seed: int, key: str, shape: tuple[int, ...], *, purpose: int = 0, si
 def read_columns(data: bytes, ending: str, section: str, most: int, most_bytes: int) -> dict[str, Doubles]:
     """Return a file's values for each copy: by key of `COLUMNS`, finite numbers (n, 1) or (n, 3).
 
-    Args:
-        ending: `.csv`: a header and a row for each copy; `.npz`: an array for each key; `.json`: a mapping of those.
-        section: `objects` or `lights`.
-        most: limit of copies.
-        most_bytes: limit of the unpacked size of a compressed file.
+    A `.csv` has a header and a row for each copy, an `.npz` an array for each key, and a `.json` a mapping of those.
+    The limits are of copies, and of the unpacked size of a compressed file.
 
     Raises:
         ValueError: the file is broken, or is not a table of copies.
@@ -243,10 +221,10 @@ def _csv_columns(data: bytes, section: str, most: int) -> dict[str, Any]:
             hint = suggestion(wrong[0], columns, most=len(columns))
             raise ValueError(f"'{wrong[0]}' is not a column, or occurs twice{hint}")
         for row in filter(None, rows):
-            if len(row) != len(header) or len(numbers) >= most:
-                raise ValueError(
-                    "too many rows" if len(row) == len(header) else f"{len(row)} values, not {len(header)}"
-                )
+            if len(row) != len(header):
+                raise ValueError(f"{len(row)} values, not {len(header)}")
+            if len(numbers) >= most:
+                raise ValueError("too many rows")
             numbers.append([float(value) for value in row])
     except (csv.Error, ValueError) as error:
         raise ValueError(f"has a mistake in line {rows.line_num}: {error}") from None

@@ -25,12 +25,12 @@ from rendergraph.keys import Key, Table, Validator, plain
 from rendergraph.keys.values import FILE
 from rendergraph.resources import is_name, shipped_scenes
 from rendergraph.scene import animate, model, scene_keys, scene_values
-from rendergraph.scene.curves import Curve, quaternion
 from rendergraph.scene.environments import SKIES, named
 from rendergraph.scene.geometry import rigid
 from rendergraph.scene.mesh_files import MESHES, read_mesh
 from rendergraph.scene.reading import Reading, inside
 from rendergraph.scene.repeat import Copies, copies, count_of, read_columns
+from rendergraph.scene.rig import Curve, quaternion
 from rendergraph.scene.shapes import SHAPES, ShapePart, build
 from rendergraph.scene.textures import TEXTURES as SHIPPED_TEXTURES
 from rendergraph.stamps import record_read

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.link import Graph
-from rendergraph.scene.curves import Curve
 from rendergraph.scene.model import Scene
+from rendergraph.scene.rig import Curve
 
 if TYPE_CHECKING:
     from rendergraph.compile import Executable

@@ -14,10 +14,10 @@ import rendergraph as rg
 from rendergraph.errors import InputError, RendergraphError
 from rendergraph.scene import animate
 from rendergraph.scene.cameras import view_matrices
-from rendergraph.scene.curves import quaternion
 from rendergraph.scene.geometry import euler_matrix
 from rendergraph.scene.load import load
 from rendergraph.scene.model import Scene
+from rendergraph.scene.rig import quaternion
 
 TIMES = (-1.0, 0.0, 0.3, 1.0, 1.7, 2.0, 2.9, 3.0, 9.0)
 
