@@ -134,12 +134,8 @@ class ObjectFacts(Struct, frozen=True, eq=False):
         return hash(self._compared)
 
     def __repr__(self) -> str:
-        names = [
-            name
-            for name in self.__struct_fields__
-            if name[0] != "_" and (name not in ("extra", "layers") or getattr(self, name))
-        ]
-        known = (f"{name}={getattr(self, name)!r}" for name in names)
+        facts = {name: getattr(self, name) for name in self.__struct_fields__ if name[0] != "_"}
+        known = (f"{name}={value!r}" for name, value in facts.items() if value or name not in ("extra", "layers"))
         return f"ObjectFacts({', '.join(known)})"
 
     @property

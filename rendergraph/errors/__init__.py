@@ -148,15 +148,8 @@ class Problem(Struct, frozen=True, eq=False):
             cause: the plugin author's line, if the problem has none yet.
         """
         context = ": ".join(filter(None, (context, self.context)))
-        return replace(
-            self,
-            code=code or self.code,
-            place=place,
-            line_text=line_text,
-            context=context,
-            cause=self.cause or cause,
-            hint=self.hint + hint,
-        )
+        code, cause, hint = code or self.code, self.cause or cause, self.hint + hint
+        return replace(self, code=code, place=place, line_text=line_text, context=context, cause=cause, hint=hint)
 
     def at_cause(self, place: Place | None) -> Problem:
         """Return the same problem for the plugin author: at their line, or else at another place of theirs."""
@@ -168,12 +161,13 @@ class Problem(Struct, frozen=True, eq=False):
 
     def as_json(self) -> dict[str, object]:
         """Return the fields of the message as plain JSON values."""
+        line, column = (self.place.line, self.place.column) if self.place and self.place.line else (None, None)
         return {
             "code": self.code,
             "severity": self.severity,
             "file": str(self.place.origin) if self.place else None,
-            "line": self.place.line if self.place and self.place.line else None,
-            "column": self.place.column if self.place and self.place.line else None,
+            "line": line,
+            "column": column,
             "text": self.message,
         }
 
@@ -207,8 +201,6 @@ class InputError(RendergraphError):
 
 class RenderError(RendergraphError):
     """Rendering or writing failed: disk, memory, GL."""
-
-    exit_code = 1
 
 
 class Interruption(BaseException):
@@ -285,17 +277,14 @@ def nearest(word: str, words: Iterable[str], *, floor: float = 0.6) -> str | Non
     """
     from difflib import get_close_matches  # only for misspelt words
 
-    known = sorted(words)
-    lowered = {candidate.lower(): candidate for candidate in reversed(known)}
+    lowered = {candidate.lower(): candidate for candidate in sorted(words, reverse=True)}
     begun = [candidate for low, candidate in lowered.items() if low.startswith(word.lower())]
     if len(begun) == 1 and len(word) > 2:
         return begun[0]
-    close = get_close_matches(word.lower(), lowered, n=1, cutoff=floor)
-    if close:
+    if close := get_close_matches(word.lower(), lowered, n=1, cutoff=floor):
         return lowered[close[0]]
     for low, candidate in sorted(lowered.items()):
-        tokens = low.replace("-", "_").split("_")
-        if get_close_matches(word.lower(), tokens, n=1, cutoff=0.75):
+        if get_close_matches(word.lower(), low.replace("-", "_").split("_"), n=1, cutoff=0.75):
             return candidate
     return None
 
@@ -312,9 +301,6 @@ def suggestion(word: str, words: Iterable[str], *, most: int = 12) -> str:
     if len(family) > 1:
         more = f" or {len(family) - 4} more" if len(family) > 5 else ""
         return f"; did you mean one of {', '.join(family[: 4 if more else 5])}{more}?"
-    near = nearest(word, known)
-    if near is not None:
+    if (near := nearest(word, known)) is not None:
         return f"; did you mean '{near}'?"
-    if 0 < len(known) <= most:
-        return f"; available: {', '.join(known)}"
-    return ""
+    return f"; available: {', '.join(known)}" if 0 < len(known) <= most else ""

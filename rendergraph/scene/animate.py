@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from itertools import chain, compress
+from itertools import compress
 from operator import is_not
 from typing import TYPE_CHECKING, Any
 
@@ -245,9 +245,8 @@ def _changed(scene: Scene, section: str, name: str, values: Mapping[str, Any], f
 
 def _with_extra(scene: Scene, name: str, added: Mapping[str, Any]) -> Scene:
     """Return the scene with changed values of plugins' keys in every part of an object."""
-    copies, objects = scene.copies.get(("objects", name)), list(scene.objects)
-    names = [name] if copies is None else [f"{name}.{number}" for number in range(len(copies.offsets))]
-    for index, _ in chain.from_iterable(scene.placements.get(name, Placement()).objects for name in names):
+    objects = list(scene.objects)
+    for index in scene.parts_of(name):
         objects[index] = replace(objects[index], extra=Extra({**objects[index].extra, **added}))
     return replace(scene, objects=tuple(objects))
 

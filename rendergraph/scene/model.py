@@ -447,6 +447,12 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         known = f"it has {', '.join(map(repr, self.variants))}" if self.variants else "it has none"
         return None if name in self.variants else f"has no variant '{shown(name)}'; {known}"
 
+    def parts_of(self, name: str) -> list[int]:
+        """Return the indices of the parts of a scene file's object, or of those of all its copies."""
+        copies = self.copies.get(("objects", name))
+        names = [name] if copies is None else [f"{name}.{number}" for number in range(len(copies.offsets))]
+        return [index for each in names for index, _ in self.placements.get(each, Placement()).objects]
+
     @cached_property
     def catchers(self) -> list[int]:
         """Indices of the objects that are shadow catchers."""

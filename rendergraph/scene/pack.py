@@ -37,12 +37,9 @@ SLOTS = (
 _VEC4 = ("<f4", (4,))
 INSTANCE = np.dtype([("rows", "<f4", (3, 4)), ("ids", "<i4", (2,))])
 """Rows of the affine object-to-world matrix (`in_object0`…`2`), material and object index (`in_ids`)."""
-_UINT, _VEC3 = "<u4", ("<f4", (3,))
 MESH = np.dtype(
-    {
-        "names": ["first_index", "count", "base_vertex", "vertices", "low", "high"],
-        "formats": [_UINT, _UINT, "<i4", _UINT, _VEC3, _VEC3],
-    }
+    [("first_index", "<u4"), ("count", "<u4"), ("base_vertex", "<i4"), ("vertices", "<u4")]
+    + [(name, "<f4", (3,)) for name in ("low", "high")]
 )
 """The location of a mesh in the streams: first index, index count, base vertex, vertex count, and its box."""
 _MATERIAL_ROWS = "base_color emissive surface specular extra phong_diffuse phong_specular phong_ambient"

@@ -105,10 +105,8 @@ def copies(values: Mapping[str, Any], columns: Mapping[str, Doubles]) -> Copies:
     for key, choices in choose.items():
         index = picks % len(choices) if order == "turn" else (picks * len(choices)).astype(int)
         kept[key] = [choices[number] for number in index.tolist()]
-    widths = {"color": 3, "intensity": 1}
-    factors = {
-        key: 1 + vary[key] * _random(seed, key, (n, widths[key]), signed=True) for key in widths.keys() & vary.keys()
-    }
+    widths = [(key, width) for key, width in (("color", 3), ("intensity", 1)) if key in vary]
+    factors = {key: 1 + vary[key] * _random(seed, key, (n, width), signed=True) for key, width in widths}
     return Copies(offsets, turns if (turns != np.eye(3)).any() else None, kept, factors)
 
 

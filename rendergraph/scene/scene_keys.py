@@ -49,13 +49,13 @@ def _share(name: str, what: str) -> Key:
     return Key(name, number(0, 1), f"Maximum fraction by which {what} changes, up or down.", 0.0)
 
 
-def _repeat(vary: tuple[Key, ...], choose: tuple[Key, ...]) -> Table:
-    """Return the table of copies of an entry; `vary` and `choose` may change these keys from copy to copy."""
+def _repeat(doc: str, vary: Iterable[Key], choose: Iterable[Key]) -> Key:
+    """Return the key for copies of an entry; `vary` and `choose` may change these keys from copy to copy."""
     spread = "number, or one for each axis; each copy gets a random value from minus to plus this"
     at = Key("at", scale(), f"Random displacement: a {spread}.", (0.0, 0.0, 0.0), "m")
     turn = Key("rotate_degrees", scale(), f"Random rotation: a {spread}.", (0.0, 0.0, 0.0), "°")
     order = Key("order", choice("random", "turn"), "Pick at random, or one after the other (`turn`).", "random")
-    return Table(
+    table = Table(
         "repeat",
         (
             Key("grid", row(_COPIES, _COPIES, _COPIES), "Copies along x, y and z; the first is where the entry is."),
@@ -83,6 +83,7 @@ def _repeat(vary: tuple[Key, ...], choose: tuple[Key, ...]) -> Table:
             "file": (),
         },
     )
+    return Key("repeat", table, doc)
 
 
 _OVERRIDABLE = (
@@ -111,12 +112,10 @@ OBJECT = Table(
         Key("rotate_degrees", vector(), "Rotation about X, then Y, then Z.", (0.0, 0.0, 0.0), "°"),
         Key("scale", scale(), "One factor, or one for each axis; applied before the rotation.", (1.0, 1.0, 1.0)),
         *_OVERRIDABLE,
-        Key(
-            "repeat",
-            _repeat(
-                (_share("scale", "the size"),), (Key("material", listed(NAME, "names", 1), "Names under `materials`."),)
-            ),
+        _repeat(
             "Draws many copies, called `name.0`, `name.1` and so on.",
+            [_share("scale", "the size")],
+            [Key("material", listed(NAME, "names", 1), "Names under `materials`.")],
         ),
     ),
     {"shape": {name: shape.keys for name, shape in SHAPES.items()}, "file": (_OVERRIDES, _PLAYS, _VARIANT)},
@@ -212,6 +211,7 @@ MATERIAL = Table(
     ),
 )
 
+_INTENSITIES = Key("intensity", listed(number(0), "numbers from 0 up", 1), "Intensities.")
 LIGHT = Table(
     "light '{}'",
     (
@@ -224,16 +224,10 @@ LIGHT = Table(
         Key("inner_degrees", number(0, 90), "Half angle of the spot's cone of full brightness.", 0.0, "°"),
         Key("outer_degrees", number(0, 90, above=True), "Half angle of the spot's whole cone.", 45.0, "°"),
         Key("casts_shadow", bool, "Whether `shadow_map.light: auto` may choose it; rays find its shadows.", True),
-        Key(
-            "repeat",
-            _repeat(
-                (_share("color", "each channel of the colour"), _share("intensity", "the intensity")),
-                (
-                    Key("color", listed(color(), "colours", 1), "Linear colours."),
-                    Key("intensity", listed(number(0), "numbers from 0 up", 1), "Intensities."),
-                ),
-            ),
+        _repeat(
             "Adds many copies, called `name.0`, `name.1` and so on.",
+            [_share("color", "each channel of the colour"), _share("intensity", "the intensity")],
+            [Key("color", listed(color(), "colours", 1), "Linear colours."), _INTENSITIES],
         ),
     ),
 )
@@ -300,7 +294,7 @@ ORBIT = Table(
 
 SECTIONS = {"objects": OBJECT, "materials": MATERIAL, "lights": LIGHT, "cameras": CAMERA, "environment": ENVIRONMENT}
 """The tables of the sections' entries, whose numbers, vectors and colours keyframes may change."""
-_SHAPE_KEYS = {key.name for shape in SHAPES.values() for key in shape.keys}
+_OF_ALTERNATIVES = {"overrides", "animation", "variant"} | {key.name for one in SHAPES.values() for key in one.keys}
 NAMES = {section: {key.name for key in table.keys} for section, table in SECTIONS.items()}
 """The names of each section's own keys, without those of shapes and of plugins."""
 
@@ -315,11 +309,9 @@ def with_plugins(
 ) -> dict[str, Table]:
     """Return `SECTIONS` with the keys that plugins add, and with these kinds of generated textures.
 
-    Args:
-        asked: the names in use, by section; two plugins with the same one of them are an error.
-
     Raises:
-        InputError: a plugin's key has the name of one of rendergraph's own (RG495), or of another plugin's (RG496).
+        InputError: a plugin's key has the name of one of rendergraph's own (RG495), or of another plugin's (RG496) if
+            the name is one of those in use (`asked`, by section).
     """
     found = dict(SECTIONS)
     if kinds is not TEXTURE_KINDS:
@@ -329,8 +321,7 @@ def with_plugins(
         added = {one.name: one for one in extensions.scene_keys(section)}
         for name in asked.get(section, ()):
             extensions.scene_key(section, name)
-        own_keys = {"overrides", "animation", "variant"} | _SHAPE_KEYS if section == "objects" else set()
-        taken = NAMES[section] | own_keys
+        taken = NAMES[section] | (_OF_ALTERNATIVES if section == "objects" else set())
         if wrong := next((one for one in added.values() if one.name in taken), None):
             text = f"plugin '{wrong.plugin}': scene_keys['{section}'] has '{wrong.name}', a key of rendergraph's own"
             raise InputError(Problem("RG495", text, Place(shown_file(wrong.file))))

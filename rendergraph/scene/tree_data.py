@@ -30,10 +30,11 @@ import numpy.typing as npt
 from msgspec import Struct
 
 from rendergraph.scene.bvh import LEAF, Tree, build, depth_limit, refit, triangle_boxes
-from rendergraph.scene.model import Floats, Matrix, Placement, Scene
+from rendergraph.scene.model import Floats, Matrix, Scene
 from rendergraph.scene.pack import PackedScene
 
-Rows: TypeAlias = npt.NDArray[np.int32]
+Ints: TypeAlias = npt.NDArray[np.int32]
+Rows: TypeAlias = Ints
 
 _CELLS = 65533  # cells of a grid, with room for rounding
 _MARGIN = 0.02  # cells by which boxes are enlarged, for the rounding of rays
@@ -62,7 +63,7 @@ class MeshTrees(Struct, frozen=True, eq=False):
 
     rows: Rows
     grids: Floats
-    roots: npt.NDArray[np.int32]
+    roots: Ints
     triangles_at: int
     shared: npt.NDArray[np.bool_]
     box: Floats
@@ -74,32 +75,29 @@ def first_rows(objects: int) -> int:
     return _HEADER + _OBJECT * (objects + 1) + _NODE * objects
 
 
-def _copies(scene: Scene) -> int:
-    """Return an upper bound on the number of copied triangles in the shared tree."""
+def _most_triangles(scene: Scene) -> int:
+    """Return an upper bound on the number of triangles in all trees, of which the shared one has copies."""
     uses = Counter(placed.mesh for placed in scene.objects)
-    return min(sum(len(scene.meshes[mesh].indices) * count for mesh, count in uses.items() if count > 1), _MOST_COPIES)
+    copies = sum(len(scene.meshes[mesh].indices) * count for mesh, count in uses.items() if count > 1)
+    return sum(len(mesh.indices) for mesh in scene.meshes) + min(copies, _MOST_COPIES)
 
 
 def most_bytes(scene: Scene) -> int:
     """Return an upper bound on the buffer's bytes, known before any tree is built."""
-    triangles = sum(len(mesh.indices) for mesh in scene.meshes) + _copies(scene)
-    return 16 * (first_rows(len(scene.objects)) + (_NODE + _TRIANGLE) * triangles)
+    return 16 * (first_rows(len(scene.objects)) + (_NODE + _TRIANGLE) * _most_triangles(scene))
 
 
 def stack_size(scene: Scene) -> int:
     """Return an upper bound on the entries of a traversal's stack, known before any tree is built."""
-    triangles = sum(len(mesh.indices) for mesh in scene.meshes) + _copies(scene)
-    return depth_limit(len(scene.objects)) + depth_limit(triangles) + 3  # end, way back to the objects, one more
+    depths = depth_limit(len(scene.objects)) + depth_limit(_most_triangles(scene))
+    return depths + 3  # end, way back to the objects, one more
 
 
 def _moving(scene: Scene) -> set[int]:
     """Return the objects whose position or shape changes over time."""
     names = {name for section, name, _ in scene.tracks if section == "objects"}
-    for name in list(names):
-        if (copies := scene.copies.get(("objects", name))) is not None:
-            names.update(f"{name}.{number}" for number in range(len(copies.offsets)))
-    names.update(name for rig in scene.rigs for name, _ in rig.placements)
-    return {number for name in names for number, _ in scene.placements.get(name, Placement()).objects}
+    names |= {name for rig in scene.rigs for name, _ in rig.placements}
+    return {number for name in names for number in scene.parts_of(name)}
 
 
 def _shared(scene: Scene, packed: PackedScene) -> npt.NDArray[np.bool_]:
@@ -122,16 +120,11 @@ def _shared(scene: Scene, packed: PackedScene) -> npt.NDArray[np.bool_]:
     return found
 
 
-def mesh_trees(
-    scene: Scene, packed: PackedScene, flags: npt.NDArray[np.int32], before: MeshTrees | None = None
-) -> MeshTrees:
+def mesh_trees(scene: Scene, packed: PackedScene, flags: Ints, before: MeshTrees | None = None) -> MeshTrees:
     """Build all missing trees at once, and lay all trees out; meshes cache their trees.
 
-    Args:
-        scene: the scene with the meshes.
-        packed: the scene with current positions.
-        flags: int32 (n,), the flags of each object's `SceneInstance`.
-        before: the result for an earlier pose of animated meshes.
+    `packed` has the current positions, `flags` (n,) are those of each object's `SceneInstance`, and `before` is the
+    result for an earlier pose of animated meshes.
     """
     shared = _shared(scene, packed)
     held: list[dict[str, Any]] = [mesh.__dict__ for mesh in scene.meshes]
@@ -187,13 +180,10 @@ def _in_world(packed: PackedScene, shapes: list[_Shape], objects: npt.NDArray[np
     return np.concatenate(positions), np.concatenate(triangles)
 
 
-def object_rows(packed: PackedScene, flags: npt.NDArray[np.int32], trees: MeshTrees) -> Rows:
+def object_rows(packed: PackedScene, flags: Ints, trees: MeshTrees) -> Rows:
     """Return the rows before those of meshes, with a tree over the objects at their current positions.
 
-    Args:
-        packed: the scene.
-        flags: int32 (n,), the flags of each object's `SceneInstance`.
-        trees: the trees of its meshes.
+    `flags` (n,) are those of each object's `SceneInstance`.
     """
     count = len(packed.object_mesh)
     rows = np.zeros((first_rows(count), 4), np.int32)
@@ -219,14 +209,12 @@ def object_rows(packed: PackedScene, flags: npt.NDArray[np.int32], trees: MeshTr
     return rows
 
 
-def _references(children: npt.NDArray[np.int32], at: int, first: int) -> npt.NDArray[np.int32]:
+def _references(children: Ints, at: int, first: int) -> Ints:
     """Return references of a mesh's tree within the buffer: nodes begin at a row, triangles at a number."""
     return np.where(children < 0, children - LEAF * first, at + _NODE * children)
 
 
-def _objects(
-    children: npt.NDArray[np.int32], at: int, tree: Tree, objects: npt.NDArray[np.int64]
-) -> npt.NDArray[np.int32]:
+def _objects(children: Ints, at: int, tree: Tree, objects: npt.NDArray[np.int64]) -> Ints:
     """Return references of the tree over objects, whose leaves have one object each."""
     leaves = -1 - objects[tree.order[np.maximum(-1 - children, 0) // LEAF]]
     return np.where(children < 0, leaves, at + _NODE * children).astype(np.int32)
@@ -242,7 +230,7 @@ def _grid(boxes: Floats) -> Floats:
     return np.stack([np.nextafter(low.astype(np.float32), np.float32(-np.inf)), (_CELLS / extent).astype(np.float32)])
 
 
-def _node_rows(boxes: Floats, children: npt.NDArray[np.int32], grid: Floats) -> Rows:
+def _node_rows(boxes: Floats, children: Ints, grid: Floats) -> Rows:
     """Return rows of nodes with their boxes (n, 2, 6), rounded outwards, and references (n, 2)."""
     low, scale = grid.astype(np.float64)
     rows = np.zeros((len(boxes), _NODE, 4), np.uint32)
