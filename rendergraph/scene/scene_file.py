@@ -27,7 +27,7 @@ from rendergraph.resources import is_name, shipped_scenes
 from rendergraph.scene import animate, model, scene_keys, scene_values
 from rendergraph.scene.environments import SKIES, named
 from rendergraph.scene.geometry import rigid
-from rendergraph.scene.mesh_files import MESHES, read_mesh
+from rendergraph.scene.load import MESHES, read_mesh
 from rendergraph.scene.reading import Reading, inside
 from rendergraph.scene.repeat import Copies, copies, count_of, read_columns
 from rendergraph.scene.rig import Curve, quaternion
