@@ -19,7 +19,7 @@ _NAMES = ("positions", "indices", "normals", "uv0", "uv1", "colors")
 
 def read_npz(path: Path, reading: Reading) -> Scene:
     """Return the scene of one mesh, which has the material that `MeshData` has by default."""
-    from rendergraph.scene.load import check_mesh  # which finds this reader
+    from rendergraph.scene.reading import check_mesh  # which finds this reader
 
     data = reading.read(path, "mesh")
     try:

@@ -117,7 +117,7 @@ def _entry(source: str | Path | Document | Mapping[str, Any], limits: YamlLimits
     if path.suffix.lower() not in (".yaml", ".yml") and path.is_file():
         import shlex  # other extensions are rare
 
-        from rendergraph.scene.load import MESHES  # likewise
+        from rendergraph.scene.reading import MESHES  # likewise
 
         if path.suffix.lower() in MESHES:
             way = f"rendergraph run full --scene {shlex.quote(shown_file(path))}"

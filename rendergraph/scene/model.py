@@ -12,7 +12,7 @@ from functools import cached_property, partial
 from itertools import compress, count
 from operator import is_not
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +23,7 @@ from rendergraph.declare import Added
 from rendergraph.declare.extensions import ImageLoader
 from rendergraph.document import YamlLimits, shown
 from rendergraph.facts import NO_EXTRA, Extra
-from rendergraph.scene.edges import Edges, find_edges, is_solid
+from rendergraph.scene.triangles import Edges, extremes, find_edges, is_solid
 from rendergraph.stamps import Stamps
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 Floats: TypeAlias = npt.NDArray[np.float32]
 Matrix: TypeAlias = npt.NDArray[np.float64]
 Vec3: TypeAlias = tuple[float, float, float]
-T = TypeVar("T", bound=np.floating[Any])
 
 
 FARTHEST = 1e12
@@ -42,12 +41,6 @@ _LAYERED = ("clearcoat", "sheen_color", "iridescence", "transmission", "shadow_c
 _REFLECTANCE = ("ior", "specular", "specular_color")
 _MOST_CONVEX = 10_000_000
 """Limit of pairs of vertex and triangle in the test for convexity: about a tenth of a second."""
-
-
-def extremes(points: npt.NDArray[T]) -> tuple[npt.NDArray[T], npt.NDArray[T]]:
-    """Return the minimum and maximum of each coordinate of points (n, 3), (3,) each."""
-    columns = np.ascontiguousarray(points.T)  # along rows of three, NumPy takes thirty times as long
-    return columns.min(axis=1), columns.max(axis=1)
 
 
 class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):

@@ -15,10 +15,9 @@ import numpy.typing as npt
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
-from rendergraph.scene.edges import find_edges
 from rendergraph.scene.model import Environment, Floats, Light, Material, Matrix, Mesh, Scene, changed_objects
-from rendergraph.scene.pack_order import first_use, ordered
 from rendergraph.scene.phong import dielectric_f0, phong_of
+from rendergraph.scene.triangles import find_edges, first_use, ordered
 from rendergraph.steps import ViewMatrices
 
 Records: TypeAlias = npt.NDArray[np.void]

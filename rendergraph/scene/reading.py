@@ -1,4 +1,4 @@
-"""The state of reading one scene or mesh file: its root rule, limits and warnings.
+"""Reading a scene or mesh file: its root rule, limits and warnings, and meshes in shipped and plugins' formats.
 
 Scene files are untrusted data. A path in one is resolved, including symbolic links, and checked against the root rule
 before anything is opened; only regular files are read, and only up to a limit.
@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import re
 import stat
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -18,11 +18,14 @@ import numpy.typing as npt
 from msgspec import Struct, field
 from msgspec.structs import replace
 
-from rendergraph.declare import NO_EXTENSIONS, READ_IMAGES, Added, Extensions
-from rendergraph.declare.extensions import ImageLoader
+from rendergraph.declare import NO_EXTENSIONS, READ_IMAGES, Added, Extensions, MeshData
+from rendergraph.declare.extensions import ImageLoader, MeshLoader
 from rendergraph.document import shown
-from rendergraph.errors import InputError, Place, Problem
-from rendergraph.scene.model import ImageSource, Material, Mesh, SceneLimits
+from rendergraph.errors import InputError, Place, Problem, shown_file
+from rendergraph.pipelines import formats
+from rendergraph.pipelines.formats import MESHES as MESHES
+from rendergraph.scene.geometry import face_normals, filled_normals
+from rendergraph.scene.model import FARTHEST, Floats, ImageSource, Material, Mesh, Object, Scene, SceneLimits
 from rendergraph.stamps import record_read
 
 CheckPath: TypeAlias = Callable[[Path, Place | None], Path]
@@ -31,6 +34,7 @@ CheckPath: TypeAlias = Callable[[Path, Place | None], Path]
 _MOST_WARNINGS = 50
 _UNAVAILABLE = ("RG011", "RG301")
 """Codes of the root rule for a path that does not exist."""
+_WIDTHS = {"positions": (3,), "normals": (3,), "uv0": (2,), "uv1": (2,), "colors": (3, 4)}
 _NOT_A_FILE = {"missing": "does not exist", "other": "is not a regular file", "unreadable": "cannot be read"}
 
 
@@ -56,18 +60,16 @@ class UniqueNames:
     """Returns names that are unique within a file: `Box`, `Box_1`, `Box_2`."""
 
     def __init__(self) -> None:
-        self._taken: set[str] = set()
-        self._next: dict[str, int] = {}
+        self._next: dict[str, int] = {}  # by name that is taken, the number to try next
 
     def unique(self, name: str, fallback: str) -> str:
         """Return `name`, or `fallback` if it is empty, with a number if it is taken."""
         base = printable(name) or fallback
         name, number = base, self._next.get(base, 1)
-        while name in self._taken:
+        while name in self._next:
             name = f"{base}_{number}"
             number += 1
-        self._next[base] = number
-        self._taken.add(name)
+        self._next |= {name: 1, base: number}
         return name
 
 
@@ -214,3 +216,110 @@ def file_kind(path: Path) -> Literal["file", "missing", "other", "unreadable"]:
 def _reason(problem: Exception) -> str:
     """Return the operating system's text without path and number."""
     return getattr(problem, "strerror", None) or shown(str(problem))
+
+
+# Meshes ---------------------------------------------------------------------------------------------------------------
+
+
+def read_mesh(path: Path, reading: Reading, unknown: Problem, known: tuple[str, ...] = MESHES) -> Scene:
+    """Read a mesh file as a scene; `unknown` is the problem if its extension is neither `known` nor a plugin's."""
+    extension = path.suffix.lower()
+    if extension in MESHES:
+        return formats.read(path, reading)
+    if (of_scenes := reading.extensions.scene_loader(extension)) is not None:
+        reading.check_file(path, "scene file")
+        what = f"scene '{shown(path.name)}'"
+        result = of_scenes.run("RG497", f"{what} cannot be read", path, reading)
+        if not isinstance(result, Scene):
+            raise _unusable(of_scenes, what, f"{type(result).__name__}, not a Scene")
+        return result
+    if (loader := reading.extensions.mesh_loader(extension)) is None:
+        added: list[Added[Any]] = [*reading.extensions.scenes(), *reading.extensions.meshes()]
+        names = [*known, *(one.name for one in added)]
+        text = f"{unknown.text} {', '.join(dict.fromkeys(names))}"
+        raise InputError([Problem(unknown.code, text, unknown.place), *reading.extensions.problems])
+    return _read_plugin_mesh(path, loader, reading)
+
+
+def _read_plugin_mesh(path: Path, loader: Added[MeshLoader], reading: Reading) -> Scene:
+    """Return the scene of a plugin's loader: an object for each `MeshData`, whose arrays are all checked."""
+    reading.check_file(path, "scene file")
+    reading.check_bytes(path, "mesh")
+    what = f"mesh '{shown(path.name)}'"
+    result = loader.run("RG497", f"{what} cannot be read", path)
+    parts = [result] if isinstance(result, MeshData) else result
+    if not isinstance(parts, Sequence) or not all(isinstance(part, MeshData) for part in parts):
+        raise _unusable(loader, what, f"{type(result).__name__}, not MeshData or a list of it")
+    if not parts:
+        reading.warn("RG332", "empty", "contains no triangle; nothing is drawn")
+    names = UniqueNames()
+    objects, meshes, materials = [], [], []
+    vertices = 0
+    for number, part in enumerate(parts):
+        name = names.unique(str(part.name), path.stem)
+        try:
+            mesh = check_mesh(part, name)
+            r, g, b = (_factor("base_color", value) for value in part.base_color)
+            metallic, roughness = _factor("metallic", part.metallic), _factor("roughness", part.roughness)
+        except (ValueError, TypeError, OverflowError) as error:
+            raise _unusable(loader, what, f"a mesh ({number}) whose {error}") from None
+        vertices += len(mesh.positions)
+        if vertices > reading.limits.vertices:
+            raise reading.over(f"{what} has {vertices:,} vertices", "vertices")
+        objects.append(Object(name, number, number, np.eye(4), node=name))
+        meshes.append(mesh)
+        materials.append(Material(name, (r, g, b, 1.0), metallic, roughness))
+    return Scene(path.stem, path, tuple(objects), tuple(meshes), tuple(materials))
+
+
+def _unusable(loader: Added[Any], what: str, text: str) -> InputError:
+    text = f"{what} cannot be read: the loader of plugin '{loader.plugin}' returned {text}"
+    return InputError(Problem("RG498", text, Place(shown_file(loader.file))))
+
+
+def check_mesh(part: MeshData, name: str = "") -> Mesh:
+    """Return the mesh of arrays; raise ValueError for a mistake, with a text that begins with the attribute's name."""
+    arrays = {key: _floats(key, getattr(part, key)) for key in _WIDTHS}
+    positions = arrays.pop("positions")
+    if positions is None or not len(positions):
+        raise ValueError("positions are missing")
+    indices = _indices(part.indices, len(positions))
+    for key, array in arrays.items():
+        if array is not None and len(array) != len(positions):
+            raise ValueError(f"{key} are {len(array)}, its positions {len(positions)}")
+    colors = arrays["colors"]
+    if colors is not None and colors.shape[1] == 3:
+        arrays["colors"] = np.concatenate([colors, np.ones((len(colors), 1), np.float32)], axis=1)
+    normals = arrays.pop("normals")
+    doubles = np.zeros(positions.shape) if normals is None else normals.astype(np.float64)
+    filled, _ = filled_normals(positions, indices, doubles)
+    has_area = face_normals(positions, indices).any(axis=1)
+    return Mesh(name, positions, indices[has_area], filled, None, arrays["uv0"], arrays["uv1"], arrays["colors"])
+
+
+def _floats(key: str, values: npt.ArrayLike | None) -> Floats | None:
+    if values is None:
+        return None
+    with np.errstate(over="ignore"):  # values beyond single precision become infinite
+        array = np.ascontiguousarray(values, np.float32)
+    if array.ndim != 2 or array.shape[1] not in _WIDTHS[key]:
+        expected = " or ".join(f"(n, {width})" for width in _WIDTHS[key])
+        raise ValueError(f"{key} have the shape {array.shape}, not {expected}")
+    if not (np.abs(array) <= FARTHEST).all():
+        raise ValueError(f"{key} are not all finite, or beyond {FARTHEST:g}")
+    return array
+
+
+def _indices(values: npt.ArrayLike, count: int) -> npt.NDArray[np.uint32]:
+    array = np.asarray(values)
+    if array.ndim != 2 or array.shape[1] != 3 or not np.issubdtype(array.dtype, np.integer):
+        raise ValueError(f"indices are {array.dtype} of shape {array.shape}, not whole numbers of shape (m, 3)")
+    if len(array) and (int(array.min()) < 0 or int(array.max()) >= count):
+        raise ValueError(f"indices go from {array.min()} to {array.max()}, its positions are {count}")
+    return np.ascontiguousarray(array, np.uint32)
+
+
+def _factor(key: str, value: float) -> float:
+    if not 0 <= value <= 1:
+        raise ValueError(f"{key} is {value}, not from 0 to 1")
+    return float(value)

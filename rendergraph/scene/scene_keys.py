@@ -26,9 +26,9 @@ from rendergraph.keys.values import (
     whole,
     word,
 )
+from rendergraph.pipelines.shapes import LENGTH, SHAPES
+from rendergraph.pipelines.textures import TEXTURES as TEXTURE_KINDS
 from rendergraph.resources import shipped_scenes
-from rendergraph.scene.shapes import LENGTH, SHAPES
-from rendergraph.scene.textures import TEXTURES as TEXTURE_KINDS
 from rendergraph.typecheck import Brief, JsonSchema, Schema, is_numeric
 
 _DIRECTION = "of any length"

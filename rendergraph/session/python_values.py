@@ -152,7 +152,7 @@ class Values:
 
         import numpy as np  # for arrays alone
 
-        from rendergraph.scene.load import check_mesh  # likewise
+        from rendergraph.scene.reading import check_mesh  # likewise
 
         try:
             check_mesh(mesh)

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rendergraph.pipelines import shapes
 
-from rendergraph.scene import pack, shapes
-from rendergraph.scene.edges import Edges, find_edges, is_solid
+from rendergraph.scene import pack
 from rendergraph.scene.model import Material, Mesh, Object, Scene
+from rendergraph.scene.triangles import Edges, find_edges, is_solid
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.uint32)

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from msgspec.structs import fields
+from rendergraph.pipelines.shapes import mesh
 
 from rendergraph.scene import animate, pack, phong
 from rendergraph.scene.load import load
 from rendergraph.scene.model import ImageSource, Light, Material, Mesh, Object, Scene, Texture
-from rendergraph.scene.pack_order import batch_acmr, first_use, morton, ordered, parts
-from rendergraph.scene.shapes import mesh
+from rendergraph.scene.triangles import batch_acmr, first_use, morton, ordered, parts
 
 
 def scene_of(meshes: Sequence[Mesh], **more: object) -> Scene:

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rendergraph.pipelines.shapes import SHAPES, build, mesh
 
 from rendergraph.projection import unit
 from rendergraph.scene.geometry import face_normals
 from rendergraph.scene.model import Mesh
-from rendergraph.scene.shapes import SHAPES, build, mesh
 from rendergraph.typecheck import conversion_to, fits
 
 SOLIDS = sorted(set(SHAPES) - {"plane", "plant"})

@@ -11,9 +11,10 @@ from rendergraph.pipelines.formats.gltf.schema import Accessor, Primitive
 from rendergraph.errors import InputError
 from rendergraph.projection import unit
 from rendergraph.scene.geometry import Indices, fan_triangles, filled_normals, flat, strip_triangles
-from rendergraph.scene.model import FARTHEST, Floats, Mesh, extremes
+from rendergraph.scene.model import FARTHEST, Floats, Mesh
 from rendergraph.scene.reading import Reading, UniqueNames
 from rendergraph.scene.rig import Deform
+from rendergraph.scene.triangles import extremes
 
 _FLOAT = (5126,)
 _SMALL = (5126, 5121, 5123)

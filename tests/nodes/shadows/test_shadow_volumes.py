@@ -14,11 +14,11 @@ import numpy.typing as npt
 import pytest
 from rendergraph.nodes.shadows._silhouettes import silhouette
 from rendergraph.nodes.shadows._volumes import bounding_spheres, touches_near_pyramid
+from rendergraph.pipelines import shapes
 
 import rendergraph as rg
 from rendergraph.api import projection
 from rendergraph.errors import InputError
-from rendergraph.scene import shapes
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import Camera
 from rendergraph.scene.pack import reversed_projection
