@@ -78,11 +78,10 @@ class _Batch(Struct, eq=False):
         first, count: int64 (k,), the node's part of the order.
         slot: int64 (k,), where the parent stores the node's reference.
         area: float32 (k,), half the surface area of the node's box.
-        level: int64 (k,), the number of inner nodes above.
-        limit: int64 (k,), the maximum number of levels of the node's tree.
-        leaf: the maximum number of primitives in a leaf.
+        level, limit: int64 (k,), the number of inner nodes above, and the maximum number of levels of the node's tree.
         numbers: int64 (m,), the primitives.
         boxes: float32 (6, m), their minimum xyz and negated maximum xyz, so that the union of boxes is a minimum.
+        leaf: the maximum number of primitives in a leaf.
     """
 
     first: Ints
@@ -103,9 +102,7 @@ class _Batch(Struct, eq=False):
         for begin, end in pairwise(edges):
             nodes = slice(begin, end)
             inside = slice(int(ends[begin] - self.count[begin]), int(ends[end - 1]))
-            columns = {
-                name: getattr(self, name)[nodes] for name in ("first", "count", "slot", "area", "level", "limit")
-            }
+            columns = {name: getattr(self, name)[nodes] for name in self.__struct_fields__[:6]}  # those of nodes
             yield _Batch(**columns, numbers=self.numbers[inside], boxes=self.boxes[:, inside], leaf=self.leaf)
 
 

@@ -185,12 +185,11 @@ def _kind_of(head: bytes, source: ImageSource) -> str:
     """Return the extension of the format; TGA has no magic number, so the name decides."""
     if not head:
         raise ImageError("RG352", "is broken: the file is empty")
-    for magic, kind in _MAGIC.items():
-        if head.startswith(magic):
-            return kind
-    if source.data is None and source.path.suffix.lower() == ".tga":
-        return ".tga"
-    raise ImageError("RG351", f"has an unknown format; {READ}")
+    is_tga = source.data is None and source.path.suffix.lower() == ".tga"
+    kind = next((kind for magic, kind in _MAGIC.items() if head.startswith(magic)), ".tga" if is_tga else None)
+    if kind is None:
+        raise ImageError("RG351", f"has an unknown format; {READ}")
+    return kind
 
 
 def _check_size(width: int, height: int, size: int, limits: SceneLimits, texel_bytes: int = 4) -> None:

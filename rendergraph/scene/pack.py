@@ -16,7 +16,7 @@ from msgspec import Struct
 from msgspec.structs import asdict, replace
 
 from rendergraph.scene.model import Environment, Floats, Light, Material, Matrix, Mesh, Scene, changed_objects
-from rendergraph.scene.phong import dielectric_f0, phong_of
+from rendergraph.scene.scene_values import dielectric_f0, phong_of
 from rendergraph.scene.triangles import find_edges, first_use, ordered
 from rendergraph.steps import ViewMatrices
 

@@ -165,19 +165,18 @@ class Reading(Struct):
         """Return an image file whose header is valid; a file is opened once."""
         if path not in self._images:
             record_read(path)
-            source = ImageSource(path, None, shown(path.name))
             loader: Added[ImageLoader] | None = None
             if path.suffix.lower() == ".npy":
                 loader = Added(".npy", _read_npy, "rendergraph", path)
             elif path.suffix.lower() not in ("", *READ_IMAGES):
                 loader = self.extensions.image_loader(path.suffix)
+            source = ImageSource(path, None, shown(path.name), loader)
             if loader is None:
                 source = self._checked(source, f"{what} '{self._name(path)}'", line)
             elif (kind := file_kind(path)) != "file":
                 raise self.error("RG350", f"{what} '{self._name(path)}' {_NOT_A_FILE[kind]}", line=line)
             else:
                 self.check_bytes(path, what)
-                source = ImageSource(path, None, source.label, loader)
             self._images[path] = source
         return self._images[path]
 

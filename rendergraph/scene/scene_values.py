@@ -22,6 +22,7 @@ from rendergraph.scene.model import Camera, Light, Material, Matrix, Texture, Ve
 
 _LENSES = {"fov_y_degrees": "perspective", "height": "orthographic", "frustum": "frustum"}
 """Types of cameras by the key that chooses them."""
+_LEAST_ALPHA = 1e-3
 _WORDS = replace(scene_keys.CAMERA, keys=tuple(key for key in scene_keys.CAMERA.keys if key.name != "follow"))
 """A camera as text always has a target."""
 
@@ -94,6 +95,47 @@ def moved_light(original: Light, matrix: Matrix) -> Light:
     direction = unit(-matrix[:3, 2])
     moved = replace(original, position=vec3(matrix[:3, 3]))
     return replace(moved, direction=vec3(direction)) if direction.any() else moved
+
+
+# Coefficients of the empirical models ---------------------------------------------------------------------------------
+#
+# `kd = base (1 - metallic)`, `ks = f0`, `4n = 2/α² - 2` with `α = roughness²`; the ambient coefficient is the albedo
+# (design.md §8).
+
+
+def dielectric_f0(ior: float) -> float:
+    """Return the reflectance at normal incidence, `((ior-1)/(ior+1))²`; an ior of 0 stands for infinity."""
+    return 1.0 if ior == 0 else ((ior - 1) / (ior + 1)) ** 2
+
+
+def f0_of(material: Material) -> Vec3:
+    """Return the specular reflectance at normal incidence, a mix of dielectric and metal."""
+    f0, metallic = dielectric_f0(material.ior), material.metallic
+    r, g, b = (
+        min(f0 * tint, 1.0) * material.specular * (1 - metallic) + base * metallic
+        for tint, base in zip(material.specular_color, material.base_color, strict=False)
+    )
+    return r, g, b
+
+
+def exponent(roughness: float) -> float:
+    alpha = max(roughness * roughness, _LEAST_ALPHA)
+    return (1 / (alpha * alpha) - 1) / 2
+
+
+def roughness_of(shininess: float) -> float:
+    return math.sqrt(math.sqrt(1 / (2 * max(0.0, shininess) + 1)))
+
+
+def phong_of(material: Material) -> tuple[Vec3, Vec3, Vec3, float]:
+    """Return ambient, diffuse and specular coefficient and the exponent n: the material's own, or derived ones."""
+    r, g, b, _ = material.base_color
+    keep = 1 - material.metallic
+    diffuse = material.diffuse or (r * keep, g * keep, b * keep)
+    ambient = material.ambient or material.diffuse or (r, g, b)
+    specular = material.specular_phong or f0_of(material)
+    n = exponent(material.roughness) if material.shininess is None else material.shininess
+    return ambient, diffuse, specular, n
 
 
 # Cameras as text, for the command line and the metadata of pictures ---------------------------------------------------

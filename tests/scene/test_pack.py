@@ -11,7 +11,7 @@ import pytest
 from msgspec.structs import fields
 from rendergraph.pipelines.shapes import mesh
 
-from rendergraph.scene import animate, pack, phong
+from rendergraph.scene import animate, pack, scene_values
 from rendergraph.scene.load import load
 from rendergraph.scene.model import ImageSource, Light, Material, Mesh, Object, Scene, Texture
 from rendergraph.scene.triangles import batch_acmr, first_use, morton, ordered, parts
@@ -168,12 +168,12 @@ def test_uv_transforms() -> None:
 
 @pytest.mark.parametrize("n", [0.5, 1, 12, 250, 1000])
 def test_phong_and_roughness_are_inverse(n: float) -> None:
-    assert phong.exponent(phong.roughness_of(n)) == pytest.approx(n)
+    assert scene_values.exponent(scene_values.roughness_of(n)) == pytest.approx(n)
 
 
 def test_phong_of_an_obj_material_is_its_own() -> None:
     own = Material("m", ambient=(1, 0, 0), diffuse=(0, 1, 0), specular_phong=(0, 0, 1), shininess=3)
-    assert phong.phong_of(own) == ((1, 0, 0), (0, 1, 0), (0, 0, 1), 3)
+    assert scene_values.phong_of(own) == ((1, 0, 0), (0, 1, 0), (0, 0, 1), 3)
 
 
 def shuffled(found: Mesh, seed: int = 0) -> np.ndarray:

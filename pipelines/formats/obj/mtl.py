@@ -16,8 +16,8 @@ from rendergraph.pipelines.formats.obj.parser import text_of
 from rendergraph.document import shown
 from rendergraph.errors import InputError
 from rendergraph.scene.model import Material, Texture, Vec3
-from rendergraph.scene.phong import dielectric_f0, roughness_of
 from rendergraph.scene.reading import Reading, printable
+from rendergraph.scene.scene_values import dielectric_f0, roughness_of
 
 _MAPS = {
     b"map_kd": "base_color",

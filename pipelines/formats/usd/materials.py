@@ -16,8 +16,8 @@ from pxr import Ar, UsdShade
 from rendergraph.document import shown
 from rendergraph.errors import InputError
 from rendergraph.scene.model import Material, Texture, Vec3
-from rendergraph.scene.phong import dielectric_f0
 from rendergraph.scene.reading import Reading
+from rendergraph.scene.scene_values import dielectric_f0
 
 Wrap = Literal["repeat", "mirror", "clamp"]
 _WRAPS: dict[str, Wrap] = {"mirror": "mirror", "clamp": "clamp", "black": "clamp"}
