@@ -94,9 +94,8 @@ def euler_matrix(degrees: npt.ArrayLike) -> Matrix:
 
 def placement(at: Sequence[float], rotation: Matrix, scale: Sequence[float]) -> Matrix:
     """Return the transform that scales, then rotates, then translates: `T·R·S` as (4, 4)."""
-    matrix = np.eye(4)
+    matrix = translation(at)
     matrix[:3, :3] = rotation * np.asarray(scale, np.float64)
-    matrix[:3, 3] = at
     return matrix
 
 
