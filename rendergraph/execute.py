@@ -42,7 +42,7 @@ from rendergraph.steps import Change, Step, UniformValue, ViewMatrices
 from rendergraph.steps.checks import buffer as buffer_of
 from rendergraph.steps.checks import check_argument, declared_port
 from rendergraph.steps.checks import uniform as uniform_of
-from rendergraph.steps.state import DepthBounds
+from rendergraph.steps.model import DepthBounds
 from rendergraph.textures import BufferDesc
 from rendergraph.typecheck import Range, quoted
 

@@ -21,7 +21,6 @@ import rendergraph.projection
 import rendergraph.scene.model
 import rendergraph.steps.frame
 import rendergraph.steps.model
-import rendergraph.steps.state
 import rendergraph.textures
 from rendergraph.reference.python import (
     PUBLIC_ERRORS,
@@ -58,7 +57,7 @@ FIRST = (
 )
 
 USED_FIRST = ("load", "loads", "Pipeline", "Frame", "Session", "compare", "sweep", "Comparison", "Sweep", "Result")
-_WITH_WORDS = (rendergraph.ports, rendergraph.textures, rendergraph.steps.model, rendergraph.steps.state)
+_WITH_WORDS = (rendergraph.ports, rendergraph.textures, rendergraph.steps.model)
 
 
 def pages() -> Iterator[tuple[str, str]]:

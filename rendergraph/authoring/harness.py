@@ -1,4 +1,4 @@
-"""The harness for checking a node: sources for its inputs, and readers for outputs that picture files cannot hold.
+"""The harness for checking a node: its variants, sources for its inputs, readers for outputs that no file can hold.
 
 Each source is a node whose class and shader are generated from the port that it feeds. Its texture holds a smooth
 pattern of values that the port's semantic allows, and carries the camera's view and the scene's first light, so that it
@@ -10,13 +10,14 @@ from __future__ import annotations
 import json
 import re
 import types
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Set
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from rendergraph import api
-from rendergraph.authoring.variants import NodeVariant
 from rendergraph.catalog import Catalog, NodeType
+from rendergraph.declare import InOut, Input, Node
 from rendergraph.ports import Samples
 from rendergraph.textures import FORMATS, TEXTURE_KINDS, TextureDesc
 
@@ -34,6 +35,78 @@ _ANY_VALUE = "vec4(at, wave, 1.0)"
 _DEPTHS = ("depth", "shadow_map")
 _BUFFER_BYTES = 1 << 20
 _FROM = "from-"  # prefix of outputs that show a source; no port begins like this
+
+
+MOST_VARIANTS = 200
+"""Maximum number of variants of one node; further ones are not rendered."""
+
+
+@dataclass(frozen=True)
+class NodeVariant:
+    """One way to use a node; its name says how it differs from the default, whose name is empty."""
+
+    name: str
+    params: Mapping[str, Any] = field(default_factory=dict)
+    unconnected: frozenset[str] = frozenset()
+    outputs: tuple[str, ...] = ()
+    multisampled: bool = False
+    is_range_end: bool = False
+
+    def without(self, cls: type[Node], inputs: Set[str]) -> NodeVariant:
+        unconnected = self.unconnected | inputs
+        usable = _usable(cls, unconnected)
+        return replace(self, unconnected=unconnected, outputs=tuple(name for name in self.outputs if name in usable))
+
+
+def variants(cls: type[Node]) -> list[NodeVariant]:
+    seen: list[NodeVariant] = []
+    for variant in _all(cls):
+        if variant.outputs and variant not in seen and len(seen) < MOST_VARIANTS:
+            seen.append(variant)
+    return seen
+
+
+def _all(cls: type[Node]) -> Iterator[NodeVariant]:
+    everything = _usable(cls, frozenset())
+    yield NodeVariant("", outputs=everything)
+    for name, value, is_end in _values(cls):
+        text = f"{name}={value}"
+        yield NodeVariant(
+            text.lower() if isinstance(value, bool) else text, {name: value}, outputs=everything, is_range_end=is_end
+        )
+    optional = [name for name, port in cls.inputs().items() if isinstance(port, Input | InOut) and port.optional]
+    for name in optional:
+        yield NodeVariant(f"without {name}", unconnected=frozenset({name}), outputs=_usable(cls, frozenset({name})))
+    if len(optional) > 1:
+        yield NodeVariant(
+            "without optional inputs", unconnected=frozenset(optional), outputs=_usable(cls, frozenset(optional))
+        )
+    if any(isinstance(port, Input) and port.samples == "any" for port in cls.inputs().values()):
+        yield NodeVariant("several samples", outputs=everything, multisampled=True)
+    if len(everything) > 1:
+        for name in everything:
+            yield NodeVariant(f"{name} alone", outputs=(name,))
+
+
+def _usable(cls: type[Node], unconnected: Set[str]) -> tuple[str, ...]:
+    return tuple(name for name, port in cls.outputs().items() if not unconnected & set(getattr(port, "needs", ())))
+
+
+def _values(cls: type[Node]) -> Iterator[tuple[str, Any, bool]]:
+    """Yield parameters that shape the program or plan, each value to try, and whether it is the end of a range."""
+    for name, parameter in cls.parameters().items():
+        if parameter.role == "param":
+            continue
+        default = parameter.default
+        if parameter.type is bool:
+            yield name, not default, False
+        for choice in parameter.choices:
+            if choice != default:
+                yield name, choice, False
+        if parameter.type in (int, float):
+            for limit in (parameter.limits.low, parameter.limits.high):
+                if limit is not None and limit != default:
+                    yield name, parameter.type(limit), True
 
 
 @dataclass

@@ -12,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import structs
 
-from rendergraph.authoring.harness import HarnessGraph
-from rendergraph.authoring.variants import NodeVariant
+from rendergraph.authoring.harness import HarnessGraph, NodeVariant
 from rendergraph.catalog import NodeType
 from rendergraph.compile.executable import CompiledStep, Draw
 from rendergraph.declare import Node

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from rendergraph.catalog import find, modules
+from rendergraph.catalog import find, types
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import NO_EXTENSIONS, Extensions, Node, type_name
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
@@ -90,7 +90,7 @@ class Catalog:
     def of(cls, *classes: type[Node], shaders: Path = Path(), **named: type[Node]) -> Catalog:
         """Return a catalog of classes, for tests; a type's name is the class's in snake case, or the keyword."""
         named = {type_name(c): c for c in classes} | named
-        files = {name: modules.file_of(c.__module__) for name, c in named.items()}
+        files = {name: types.file_of(c.__module__) for name, c in named.items()}
         return cls({}, {name: NodeType(name, "", c, files[name], shaders, "test") for name, c in named.items()})
 
     def with_classes(self, named: Mapping[str, type[Node]]) -> Catalog:
@@ -129,9 +129,9 @@ class Catalog:
         if name in self._types:
             return self._types[name]
         if (cls := self._classes.get(name)) is not None:
-            file = modules.file_of(cls.__module__)
+            file = types.file_of(cls.__module__)
             listed = Listed(cls.__module__, "", file, (file.parent if file.name else Path()).resolve(), NOTEBOOK)
-            return self._types.setdefault(name, modules.of_class(name, cls, listed))
+            return self._types.setdefault(name, types.of_class(name, cls, listed))
         if name not in self._listed:
             raise InputError(Problem("RG102", f"there is no node type '{name}'{suggestion(name, self.names())}"))
         key = (name, self._listed[name])
@@ -157,7 +157,7 @@ class Catalog:
             text = f"node type '{name}' comes from {plugins}; rename one"
             raise InputError(Problem("RG493", text, Place(shown_file(listed.file))))
         if listed.module:
-            return modules.load(name, listed)
+            return types.load(name, listed)
         from rendergraph.catalog import shader  # most pipelines use no shader files
 
         return shader.load(name, listed, self.extensions)

@@ -20,8 +20,7 @@ from typing import Any
 from msgspec import Struct
 
 from rendergraph.catalog import header
-from rendergraph.catalog.modules import PREFIX, fresh_package, shader_folder
-from rendergraph.catalog.types import SHADERS, Listed
+from rendergraph.catalog.types import PREFIX, SHADERS, Listed, fresh_package, shader_folder
 from rendergraph.declare import Extension, Extensions, Source, extension_mistakes
 from rendergraph.declare.blame import describe_error, source_location
 from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file

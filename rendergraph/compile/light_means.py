@@ -15,7 +15,7 @@ from rendergraph.gl import state as gl_state
 from rendergraph.gl import textures
 from rendergraph.program.text import VERSION
 from rendergraph.resources import folder
-from rendergraph.steps.state import ADD, State
+from rendergraph.steps import ADD, State
 from rendergraph.textures import Semantic, TextureDesc
 
 if TYPE_CHECKING:

@@ -34,7 +34,7 @@ from rendergraph.gl.queries import OcclusionQuery, Timer
 from rendergraph.gl.raw import RawGL
 from rendergraph.gl.textures import Clear, poison_value
 from rendergraph.glsl.globals import declared_blocks
-from rendergraph.glsl.reachable import compiled_text
+from rendergraph.glsl.names import compiled_text
 from rendergraph.program import (
     StageText,
     StepTexts,

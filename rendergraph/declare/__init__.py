@@ -13,8 +13,17 @@ from rendergraph.declare.extensions import (
     extension_mistakes,
 )
 from rendergraph.declare.mistakes import RESERVED_NAMES, declaration_mistakes
-from rendergraph.declare.node import DROPPED, Node, type_name
-from rendergraph.declare.parameters import FileContent, InputFile, Parameter, define, param, structural
+from rendergraph.declare.node import (
+    DROPPED,
+    FileContent,
+    InputFile,
+    Node,
+    Parameter,
+    define,
+    param,
+    structural,
+    type_name,
+)
 from rendergraph.declare.scene_keys import Image, SceneKey, Section, TextureKind
 from rendergraph.facts import CameraFacts, Facts, LightFacts, MaterialFacts, ObjectFacts, TextureInfo, casting_lights
 from rendergraph.ports import (

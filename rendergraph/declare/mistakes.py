@@ -11,8 +11,7 @@ from typing import Literal, get_args, get_origin
 from weakref import WeakSet
 
 from rendergraph.declare.blame import describe_error
-from rendergraph.declare.node import Node
-from rendergraph.declare.parameters import Parameter
+from rendergraph.declare.node import Node, Parameter
 from rendergraph.errors import Problem, is_interruption, suggestion
 from rendergraph.ports import Function, History, InOut, Input, Internal, Output, Port, Views, WrittenPort
 from rendergraph.textures import SceneData, Semantic, Signature

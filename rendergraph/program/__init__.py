@@ -22,10 +22,12 @@ from rendergraph.program.checks import (
     missing,
     named_reads,
     ray_warnings,
+    unbound_block,
+    unbound_sampler,
     unfit_outputs,
     unfit_sampler,
+    unset_uniform,
     used_blocks,
     used_names,
 )
 from rendergraph.program.text import StageText, StepTexts, positions_macro, prefix, stage_texts, text_key
-from rendergraph.program.unbound import unbound_block, unbound_sampler, unset_uniform

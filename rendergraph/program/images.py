@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator, Mapping
 from msgspec.structs import replace
 
 from rendergraph.errors import InputError, Problem, suggestion
-from rendergraph.glsl.reachable import compiled_text
+from rendergraph.glsl.names import compiled_text
 from rendergraph.glsl.source import SourceText
 from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import FORMATS, GLSL_SHAPES, TextureDesc

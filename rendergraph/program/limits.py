@@ -9,7 +9,7 @@ from rendergraph.catalog import NodeType
 from rendergraph.errors import InputError, Problem, RenderError
 from rendergraph.expand import ViewTable
 from rendergraph.glsl.globals import declared_blocks, declared_samplers, globals_of
-from rendergraph.glsl.reachable import compiled_text, reachable_names
+from rendergraph.glsl.names import compiled_text, reachable_names
 from rendergraph.program.text import StepTexts
 from rendergraph.program.variants import FIXED_BLOCKS, variants
 from rendergraph.scene.model import Scene

@@ -14,11 +14,12 @@ from rendergraph.expand import ViewTable
 from rendergraph.glsl.globals import Global, globals_of
 from rendergraph.glsl.names import declared, without_directives
 from rendergraph.glsl.source import Origin, SourceText
+from rendergraph.program.checks import sampler_of
 from rendergraph.program.text import StageText, prefix, read_defines, screen_reads, signatures_of
 from rendergraph.resources import folder
 from rendergraph.scene.pack import SLOTS
 from rendergraph.steps import Read, Resource, Step
-from rendergraph.textures import FORMATS, GLSL_SHAPES, TextureDesc
+from rendergraph.textures import TextureDesc
 
 _BLOCK = re.compile(r"\b(?:uniform|buffer)\s+(\w+)\s*\{([^{}]*)\}")
 
@@ -49,17 +50,9 @@ def in_scope(
     texts: Mapping[str, StageText],
 ) -> list[InScope]:
     """Return everything in scope in a step by section; `texts` is the result of `stage_texts`."""
-    found = _Scope(step, types, resources)
-    rows = [
-        *found.textures(),
-        *found.uniforms(texts),
-        *found.blocks(texts),
-        *found.macros(read_defines(step.reads, resources, views), defines),
-        *found.functions(),
-        *found.includes(texts),
-        *found.between(texts),
-        *found.outputs(),
-    ]
+    found = _Scope(step, types, resources, texts)
+    rows = [*found.textures(), *found.uniforms(), *found.blocks(), *found.functions(), *found.includes()]
+    rows += [*found.macros(read_defines(step.reads, resources, views), defines), *found.between(), *found.outputs()]
     return sorted(rows, key=lambda row: SECTIONS.index(row.section))
 
 
@@ -71,22 +64,19 @@ class _Scope:
     step: Step
     types: Mapping[str, NodeType]
     resources: Mapping[str, Resource]
+    texts: Mapping[str, StageText]
 
     def textures(self) -> Iterator[InScope]:
         for before, read in self._reads():
             desc = self.resources[read.resource].desc
             if not isinstance(desc, TextureDesc) or read.use not in ("sample", "image"):
                 continue
-            letter = {"int": "i", "uint": "u"}.get(FORMATS[desc.format].family, "")
-            kind = GLSL_SHAPES[read.kind] + ("MS" if desc.samples > 1 else "")
-            word = "image" if read.use == "image" else "sampler"
-            shadow = "Shadow" if read.sampler.compare and read.use == "sample" else ""
-            yield InScope(
-                "textures", f"uniform {letter}{word}{kind}{shadow} {before}{read.name}", self._port(before, read)
-            )
+            kind = sampler_of(read, self.resources[read.resource])
+            kind = kind.replace("sampler", "image") if read.use == "image" else kind
+            yield InScope("textures", f"uniform {kind} {before}{read.name}", self._port(before, read))
 
-    def uniforms(self, texts: Mapping[str, StageText]) -> Iterator[InScope]:
-        types = {one.name: one for text in texts.values() for one, _ in _globals(text.source, "uniform")}
+    def uniforms(self) -> Iterator[InScope]:
+        types = {one.name: one for text in self.texts.values() for one, _ in _globals(text.source, "uniform")}
         textures = {before + read.name for before, read in self._reads()} | {one.name for one in self.step.writes}
         values = [("", self.step.node, name, value) for name, value in self.step.uniforms]
         for one in self.step.functions:
@@ -109,10 +99,10 @@ class _Scope:
                 section = "textures" if "sampler" in declaration.type or "image" in declaration.type else "uniforms"
                 yield InScope(section, f"uniform {_type(declaration)} {name}", where)
 
-    def blocks(self, texts: Mapping[str, StageText]) -> Iterator[InScope]:
+    def blocks(self) -> Iterator[InScope]:
         seen = set()
         buffers = {before + read.name: (before, read) for before, read in self._reads() if read.use == "buffer"}
-        for text in texts.values():
+        for text in self.texts.values():
             for match in _BLOCK.finditer(without_directives(text.text)):
                 name, members = match[1], " ".join(match[2].split())
                 if name in seen:
@@ -122,15 +112,11 @@ class _Scope:
                 where = self._port(*buffers[name]) if name in buffers else origin.purpose or _file(origin.file)
                 yield InScope("blocks", f"{name} {{ {members} }}", where)
         for before, read in self._reads():
-            resource = self.resources[read.resource]
-            if resource.view is not None and f"{before}{read.name}_view_block" not in seen:
-                yield InScope(
-                    "blocks", f"{before}{read.name}_views[]", f"the views of '{read.name}', where it is looked at"
-                )
+            resource, name = self.resources[read.resource], before + read.name
+            if resource.view is not None and f"{name}_view_block" not in seen:
+                yield InScope("blocks", f"{name}_views[]", f"the views of '{read.name}', where it is looked at")
             if resource.lights:
-                yield InScope(
-                    "blocks", f"{before}{read.name}_lights[]", f"the scene's light of each layer of '{read.name}'"
-                )
+                yield InScope("blocks", f"{name}_lights[]", f"the scene's light of each layer of '{read.name}'")
 
     def macros(self, of_reads: Mapping[str, str], added: Mapping[str, str]) -> Iterator[InScope]:
         node = self.types[self.step.node].cls
@@ -156,17 +142,16 @@ class _Scope:
 
     def functions(self) -> Iterator[InScope]:
         for signature in signatures_of(self.step, self.types).values():
-            by = [one.node for one in self.step.functions if one.signature == signature.name]
-            by = [f"node '{node}'" for node in by]
+            by = [f"node '{one.node}'" for one in self.step.functions if one.signature == signature.name]
             by += [f"texture '{read.name}'" for read in screen_reads(signature, self.step, self.types[self.step.node])]
             without = f"it returns {signature.neutral}" if signature.combine else "it is not defined"
             given = " and ".join(by) or f"no node of this pipeline; {without}"
             yield from (InScope("functions", each.declaration, given) for each in signature.functions)
 
-    def includes(self, texts: Mapping[str, StageText]) -> Iterator[InScope]:
+    def includes(self) -> Iterator[InScope]:
         """Yield the names of every file except the stages' own, under any condition."""
         lines: dict[tuple[Path, str], list[str]] = {}
-        for text in texts.values():
+        for text in self.texts.values():
             for line, origin in zip(text.source.lines, text.source.origins, strict=True):
                 if origin.file is not None and (origin.by is not None or origin.shared or origin.prefix):
                     lines.setdefault((origin.file, origin.prefix), []).append(line)
@@ -178,21 +163,18 @@ class _Scope:
             if names:
                 yield InScope("includes", _file(file), ", ".join([*called, *others]))
 
-    def between(self, texts: Mapping[str, StageText]) -> Iterator[InScope]:
+    def between(self) -> Iterator[InScope]:
         """Yield the inputs of the vertex shader, and the values between stages."""
-        for stage, storage, section in (
-            ("vertex", "in", "attributes"),
-            ("vertex", "out", "varyings"),
-            ("geometry", "out", "varyings"),
-        ):
-            for one, origin in _globals(texts[stage].source, storage) if stage in texts else ():
+        for stage, storage in (("vertex", "in"), ("vertex", "out"), ("geometry", "out")):
+            section = "attributes" if storage == "in" else "varyings"
+            for one, origin in _globals(self.texts[stage].source, storage) if stage in self.texts else ():
                 name = " ".join([*sorted(one.qualifiers), _type(one), one.name])
                 yield InScope(section, name, f"{stage} shader, {origin.purpose or _file(origin.file)}")
 
     def outputs(self) -> Iterator[InScope]:
         for write in self.step.writes:
             desc = self.resources[write.resource].desc
-            what = f"{desc.format}" if isinstance(desc, TextureDesc) else "a buffer"
+            what = desc.format if isinstance(desc, TextureDesc) else "a buffer"
             word = {"color": "out vec4 ", "image": "uniform image2D ", "buffer": "buffer ", "depth": "gl_FragDepth: "}
             yield InScope("outputs", f"{word[write.use]}{write.name}", f"{write.resource}, {what}")
 
@@ -207,9 +189,9 @@ class _Scope:
         if before:
             return f"{read.resource}{last}, for a function"
         inputs = self.types[self.step.node].cls.inputs()
-        name = re.sub(r"_\d+\Z", "", read.name)
-        if read.name in inputs or name in inputs:
-            return f"input '{read.name if read.name in inputs else name}': {read.resource}{last}"
+        for name in (read.name, re.sub(r"_\d+\Z", "", read.name)):
+            if name in inputs:
+                return f"input '{name}': {read.resource}{last}"
         return f"its own '{port}'{last}" if node == self.step.node else f"{read.resource}{last}"
 
 
@@ -245,20 +227,19 @@ def _file(file: Path | None) -> str:
 def annotated(text: StageText) -> str:
     """Return a stage's text with a comment before each run of lines that names its file; it compiles as before."""
     found: list[str] = []
-    last = Origin()
-    gap = True
+    last, gap = Origin(), True
     for line, origin in zip(text.source.lines, text.source.origins, strict=True):
         if not line.strip():
             gap = True
             continue
         purpose = "macros" if origin.purpose.startswith("the macro ") else origin.purpose
-        follows = origin.file == last.file and (
-            purpose == last.purpose if origin.file is None else origin.line == last.line + 1
-        )
-        if not follows or (gap and origin.file is not None):
-            label = f"{_file(origin.file)}:{origin.line}" if origin.file is not None else purpose or "rendergraph"
+        if origin.file is None:
+            follows, label = last.file is None and purpose == last.purpose, purpose or "rendergraph"
+        else:
+            follows = origin.file == last.file and origin.line == last.line + 1 and not gap
+            label = f"{_file(origin.file)}:{origin.line}"
+        if not follows:
             found += [""] * bool(found) + [f"// {label}"]
         found.append(line)
-        last = Origin(origin.file, origin.line, purpose=purpose)
-        gap = False
+        last, gap = Origin(origin.file, origin.line, purpose=purpose), False
     return "\n".join(found) + "\n"

@@ -9,11 +9,22 @@ from __future__ import annotations
 from rendergraph.steps.checks import define_text
 from rendergraph.steps.frame import Change, Frame, FrameScene, ViewMatrices
 from rendergraph.steps.model import (
+    ADD,
+    ALPHA,
     MOST_STEPS,
+    MULTIPLY,
+    PREMULTIPLIED,
+    Blend,
+    BlendFactor,
+    Compare,
     FunctionBinding,
     Read,
     Resource,
     Role,
+    State,
+    Stencil,
+    StencilFace,
+    StencilOp,
     Step,
     UniformValue,
     Upload,
@@ -22,16 +33,3 @@ from rendergraph.steps.model import (
     Write,
 )
 from rendergraph.steps.recorder import BUFFER_OPTIONS, Recorder, StepRequest, Steps, Target
-from rendergraph.steps.state import (
-    ADD,
-    ALPHA,
-    MULTIPLY,
-    PREMULTIPLIED,
-    Blend,
-    BlendFactor,
-    Compare,
-    State,
-    Stencil,
-    StencilFace,
-    StencilOp,
-)

@@ -50,32 +50,26 @@ class FrameScene(Protocol):
     @property
     def lights(self) -> Sequence[Any]:
         """The scene's lights, in its order."""
-        ...
 
     @property
     def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Minimum and maximum corner of all visible objects except shadow catchers."""
-        ...
 
     @property
     def catchers(self) -> npt.NDArray[np.int64]:
         """Indices of the visible shadow catchers, (n,)."""
-        ...
 
     @property
     def corners(self) -> npt.NDArray[np.float64]:
         """World-space corners of the box of each object, (n, 8, 3); read-only."""
-        ...
 
     @property
     def casting(self) -> npt.NDArray[np.bool_]:
         """Mask of objects that are visible and cast a shadow, (n,)."""
-        ...
 
     @property
     def shown(self) -> npt.NDArray[np.bool_]:
         """Mask of objects that are not hidden, (n,)."""
-        ...
 
     @property
     def objects(self) -> Sequence[Any]:
@@ -83,19 +77,16 @@ class FrameScene(Protocol):
 
         `pose` is None, or has the `box` of an animated mesh and `vertices()`, its current `positions` and `normals`.
         """
-        ...
 
     @property
     def camera(self) -> Any:
         """The scene's camera with `name`, `transform` and other values; `Frame.camera` has the matrices."""
-        ...
 
     def pixels(self, image: Any) -> npt.NDArray[np.float32]:
         """Decode an image that is the value of a `SceneKey`: (height, width, 4), top row first.
 
         Integers are scaled to 0…1 without a transfer function; HDR and EXR files give linear light.
         """
-        ...
 
     @property
     def meshes(self) -> Sequence[Any]:
@@ -104,12 +95,10 @@ class FrameScene(Protocol):
         `box` is a mesh's minimum and maximum corner, `edges` its edge adjacency, `plane` the plane that contains it, or
         None; each is computed once.
         """
-        ...
 
     @property
     def materials(self) -> Sequence[Any]:
         """The materials that an object's `material` indexes."""
-        ...
 
 
 class Frame(Protocol):
@@ -128,19 +117,15 @@ class Frame(Protocol):
     @property
     def scene(self) -> FrameScene:
         """The scene in this frame, a `FrameScene`."""
-        ...
 
     def connected(self, port: Port) -> bool:
         """Whether an input is connected."""
-        ...
 
     def views(self, port: Port) -> Sequence[ViewMatrices]:
         """Return the views that the texture at an input was rendered with, in order; none if it is not connected."""
-        ...
 
     def set_views(self, port: Views, views: Sequence[ViewMatrices]) -> None:
         """Set the views of a declared table."""
-        ...
 
     def set_region(
         self,
@@ -157,7 +142,6 @@ class Frame(Protocol):
             depth_bounds: minimum and maximum value in the depth texture for which fragments pass, 0 to 1. Drivers
                 without depth bounds ignore it, so it may save work but must not change the picture.
         """
-        ...
 
     def set_uniform(self, name: str, value: UniformValue) -> None:
         """Set a uniform of the node's steps from now on.
@@ -165,7 +149,6 @@ class Frame(Protocol):
         It must have an initial value: a parameter, or a keyword of a step (`steps.fullscreen(…, wind=(0, 0))`). Steps
         that compute kept values keep the initial value.
         """
-        ...
 
     def changed(self, *what: Change) -> bool:
         """Return whether anything has changed since the previous frame; true in the first frame.
@@ -175,8 +158,6 @@ class Frame(Protocol):
                 `parameters`, `size`; by default all of them. After a change of parameters or size, the next frame is
                 a first frame.
         """
-        ...
 
     def write(self, port: Port, values: npt.NDArray[Any]) -> None:
         """Upload an array into a declared buffer; it may have fewer bytes than the buffer."""
-        ...

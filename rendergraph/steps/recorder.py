@@ -15,8 +15,7 @@ from rendergraph.facts import Facts, LightFacts
 from rendergraph.ports import Count, InOut, Input, Output, Part, Port, Positive, Shader, Texel, Views
 from rendergraph.steps import checks
 from rendergraph.steps.checks import Counts, Macro, checked
-from rendergraph.steps.model import DrawOrder, MaterialLevel, SceneSource, Topology, UniformValue, Upload
-from rendergraph.steps.state import State
+from rendergraph.steps.model import DrawOrder, MaterialLevel, SceneSource, State, Topology, UniformValue, Upload
 from rendergraph.textures import BufferDesc, TextureDesc
 from rendergraph.typecheck import quoted
 
@@ -27,27 +26,21 @@ class Recorder(Protocol):
     @property
     def facts(self) -> Facts:
         """Facts about the graph and the scene."""
-        ...
 
     def desc(self, port: Port) -> TextureDesc | BufferDesc:
         """Return the description of a port's texture or buffer."""
-        ...
 
     def used(self, port: Port) -> bool:
         """Whether any node reads an output."""
-        ...
 
     def needs(self, parameter: str) -> tuple[str, ...]:
         """Return the needs of a parameter's choice."""
-        ...
 
     def reads(self, out: Iterable[Part]) -> Mapping[str, Port]:
         """Return the inputs that a step reads if it names none."""
-        ...
 
     def add(self, request: StepRequest) -> None:
         """Add a request."""
-        ...
 
 
 class StepRequest(Struct, frozen=True, gc=False):
