@@ -10,7 +10,8 @@ from msgspec.structs import replace
 
 from rendergraph.catalog import find, types
 from rendergraph.catalog.types import Listed, NodeType
-from rendergraph.declare import NO_EXTENSIONS, Extensions, Node, type_name
+from rendergraph.declare import NO_EXTENSIONS, Extensions, Node
+from rendergraph.declare.node import type_name
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
 from rendergraph.installed import entry_points, plain
 

@@ -11,11 +11,12 @@ from typing import Any
 
 from rendergraph.catalog.header import Header
 from rendergraph.catalog.parameter import ParameterReader, uniform_names
-from rendergraph.declare import Extensions, Facts, Input, Node, Output, Parameter, Port, Ruled, SizeRule, WrittenPort
+from rendergraph.declare import Extensions, Facts, Input, Node, Output, Parameter, Port, WrittenPort
 from rendergraph.document import Value
 from rendergraph.errors import Place, Problem, shown_file, suggestion
 from rendergraph.glsl import SourceText, is_shadertoy, strip_comments
 from rendergraph.glsl.globals import Global, globals_of
+from rendergraph.ports import Ruled, SizeRule
 from rendergraph.textures import (
     FORMATS,
     GLSL_SHAPES,

@@ -21,8 +21,8 @@ from msgspec import Struct
 
 from rendergraph.catalog import header
 from rendergraph.catalog.types import PREFIX, SHADERS, Listed, fresh_package, shader_folder
-from rendergraph.declare import Extension, Extensions, Source, extension_mistakes
 from rendergraph.declare.blame import describe_error, source_location
+from rendergraph.declare.extensions import Extension, Extensions, Source, extension_mistakes
 from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
 from rendergraph.installed import EntryPoint, plain
 from rendergraph.settings import expand_home, nearest_settings

@@ -11,7 +11,7 @@ from rendergraph.declare import Node
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.gl.programs import Program, Uniform, member_offsets, outputs_of
 from rendergraph.glsl.globals import globals_of
-from rendergraph.program import (
+from rendergraph.program.checks import (
     Texts,
     named_reads,
     unbound_block,

@@ -35,15 +35,8 @@ from rendergraph.gl.raw import RawGL
 from rendergraph.gl.textures import Clear, poison_value
 from rendergraph.glsl.globals import declared_blocks
 from rendergraph.glsl.names import compiled_text
-from rendergraph.program import (
-    StageText,
-    StepTexts,
-    Texts,
-    check_kept_text,
-    check_scene_includes,
-    missing,
-    positions_macro,
-)
+from rendergraph.program import StageText, StepTexts, positions_macro
+from rendergraph.program.checks import Texts, check_kept_text, check_scene_includes, missing
 from rendergraph.program.limits import check_plan, groups_of
 from rendergraph.program.variants import FIXED_BLOCKS, view_count
 from rendergraph.schedule import step_names

@@ -119,18 +119,20 @@ def extension_mistakes(extension: Extension, folder: Path) -> list[Problem]:
     """Return the mistakes in an extension whose includes are in a folder; the subjects are its fields."""
     if mistakes := list(mistakes_of(extension, "")):
         return mistakes
+    return [Problem("RG495", text, subject=field) for field, text in _mistakes(extension, folder)]
+
+
+def _mistakes(extension: Extension, folder: Path) -> Iterator[tuple[str, str]]:
     for parameter, choices in extension.choices.items():
         for name, include in choices.items():
             if not (folder / include).is_file():
-                text = f"choices['{parameter}']['{name}']: there is no file '{include}' beside the extension"
-                mistakes.append(Problem("RG495", text, subject="choices"))
+                yield "choices", f"choices['{parameter}']['{name}']: there is no file '{include}' beside the extension"
     for field, (taken, text) in _TAKEN.items():
-        names = [name for name in getattr(extension, field) if name in taken]
-        mistakes += [Problem("RG495", text.format(name), subject=field) for name in names]
+        yield from ((field, text.format(name)) for name in getattr(extension, field) if name in taken)
     for name, kind in extension.textures.items():
         wrong = kind.mistake() or ("" if (folder / kind.shader).is_file() else f"has no file '{kind.shader}' beside it")
         if wrong:
-            mistakes.append(Problem("RG495", f"textures['{name}'] {wrong}", subject="textures"))
+            yield "textures", f"textures['{name}'] {wrong}"
     for section, keys in extension.scene_keys.items():
         named = [key.name for key in keys]
         for key in keys:
@@ -138,20 +140,11 @@ def extension_mistakes(extension: Extension, folder: Path) -> list[Problem]:
             if not test_of(Word)(key.name):
                 wrong = f"has a name that is not {words_for(Word)}"
             if wrong:
-                text = f"scene_keys['{section}']: the key '{key.name}' {wrong}"
-                mistakes.append(Problem("RG495", text, subject="scene_keys"))
-    return mistakes
+                yield "scene_keys", f"scene_keys['{section}']: the key '{key.name}' {wrong}"
 
 
 class Added(Struct, Generic[T], frozen=True):
-    """One thing that a plugin adds.
-
-    Attributes:
-        name: its name.
-        value: the thing.
-        plugin: a distribution, or a folder.
-        file: the module of the extension.
-    """
+    """One thing that a plugin (a distribution, or a folder) adds; `file` is the module of the extension."""
 
     name: str
     value: T
@@ -159,15 +152,9 @@ class Added(Struct, Generic[T], frozen=True):
     file: Path
 
     def run(self: Added[Callable[..., R]], code: str, doing: str, *arguments: Any) -> R:
-        """Call the function that was added; any exception except `InputError` becomes an error at the author's line.
+        """Call the function that was added; any exception becomes an `InputError` with the code, at the author's line.
 
-        Args:
-            code: of the error.
-            doing: what could not be done, as the beginning of a sentence.
-            arguments: of the call.
-
-        Raises:
-            InputError: it raised.
+        `doing` is what could not be done, as the beginning of a sentence.
         """
         try:
             return self.value(*arguments)
@@ -186,6 +173,15 @@ class Source(Struct, frozen=True):
     file: Path
     extension: Extension | None
     problems: tuple[Problem, ...] = ()
+
+
+_KINDS = {
+    "meshes": "mesh loader",
+    "scenes": "scene loader",
+    "images": "image loader",
+    "metrics": "metric",
+    "textures": "kind of texture",
+}
 
 
 class Extensions:
@@ -231,17 +227,9 @@ class Extensions:
         """Return the include of a plugin's choice of a parameter."""
         return _one(f"choice of '{parameter}'", name, self.choices(parameter))
 
-    def mesh_loader(self, ending: str) -> Added[MeshLoader] | None:
-        """Return the reader of mesh files with this extension."""
-        return _one("mesh loader", ending.lower(), self.meshes())
-
-    def scene_loader(self, ending: str) -> Added[SceneLoader] | None:
-        """Return the reader of whole scenes in files with this extension."""
-        return _one("scene loader", ending.lower(), self.scenes())
-
-    def image_loader(self, ending: str) -> Added[ImageLoader] | None:
-        """Return the decoder of image files with this extension."""
-        return _one("image loader", ending.lower(), self._added("images"))
+    def loader(self, field: str, ending: str) -> Added[Any] | None:
+        """Return the reader of files with an ending: one of the `meshes`, `scenes` or `images`."""
+        return _one(_KINDS[field], ending.lower(), self.added(field))
 
     def semantics(self) -> list[Added[Semantic]]:
         """Return the semantics of plugins; equal ones of several plugins are listed once."""
@@ -256,17 +244,9 @@ class Extensions:
         """Return the absolute includes of plugins' choices of a parameter."""
         return [added for name, added in self._choices() if name == parameter]
 
-    def meshes(self) -> list[Added[MeshLoader]]:
-        """Return the loaders of mesh files."""
-        return self._added("meshes")
-
-    def scenes(self) -> list[Added[SceneLoader]]:
-        """Return the loaders of whole scenes."""
-        return self._added("scenes")
-
     def metrics(self) -> list[Added[Metric]]:
         """Return the metrics of pictures; two with the same name are an error."""
-        found: list[Added[Metric]] = self._added("metrics")
+        found = self.added("metrics")
         for metric in found:
             _one("metric", metric.name, found)
         return found
@@ -283,7 +263,7 @@ class Extensions:
 
     def textures(self) -> dict[str, TextureKind]:
         """Return the kinds of generated textures with absolute shader paths; two with the same name are an error."""
-        added: list[Added[TextureKind]] = self._added("textures")
+        added = self.added("textures")
         return {
             one.name: replace(one.value, shader=one.file.parent / one.value.shader)
             for one in added
@@ -298,37 +278,30 @@ class Extensions:
         """Return everything that plugins add, as plain values: `kind`, `name`, `plugin`, `doc`."""
         rows: list[tuple[str, Added[Any]]] = [("semantic", added) for added in self.semantics()]
         rows += self._choices()
-        for field, kind in (
-            ("meshes", "mesh loader"),
-            ("scenes", "scene loader"),
-            ("images", "image loader"),
-            ("metrics", "metric"),
-            ("textures", "kind of texture"),
-        ):
-            rows += [(kind, added) for added in self._added(field)]
+        for field, kind in _KINDS.items():
+            rows += [(kind, added) for added in self.added(field)]
         for section in get_args(Section):
             rows += [(f"key of {section}", added) for added in self.scene_keys(section)]
         return [
             {"kind": kind, "name": added.name, "plugin": added.plugin, "doc": _doc(added.value)} for kind, added in rows
         ]
 
+    def added(self, field: str) -> list[Added[Any]]:
+        """Return what plugins add in a field of `Extension` that maps names to values."""
+        return [
+            Added(name, value, source.plugin, source.file)
+            for source, extension in self._usable()
+            for name, value in getattr(extension, field).items()
+        ]
+
     def _usable(self) -> Iterator[tuple[Source, Extension]]:
-        for source in self.sources:
-            if source.extension is not None:
-                yield source, source.extension
+        return ((source, source.extension) for source in self.sources if source.extension is not None)
 
     def _choices(self) -> Iterator[tuple[str, Added[Path]]]:
         for source, extension in self._usable():
             for parameter, choices in extension.choices.items():
                 for name, include in choices.items():
                     yield str(parameter), Added(name, source.file.parent / include, source.plugin, source.file)
-
-    def _added(self, field: str) -> list[Added[Any]]:
-        return [
-            Added(name, value, source.plugin, source.file)
-            for source, extension in self._usable()
-            for name, value in getattr(extension, field).items()
-        ]
 
 
 def _one(what: str, name: str, added: Sequence[Added[T]]) -> Added[T] | None:

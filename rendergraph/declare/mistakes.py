@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping
 from inspect import get_annotations, getattr_static
 from pathlib import Path
-from typing import Literal, get_args, get_origin
+from typing import Literal, TypeAlias, get_args, get_origin
 from weakref import WeakSet
 
 from rendergraph.declare.blame import describe_error
@@ -38,6 +38,8 @@ _ROLES = "param(…), define(…) or structural(…)"
 
 _METHODS = {"record": "self, steps", "update": "self, frame", "camera_jitter": "self, frame"}
 _TAKES_ANY = 0x04  # code flag of a function with *arguments
+Mistakes: TypeAlias = Iterator[tuple[str, str]]
+"""The subject and text of each mistake."""
 _SOUND: WeakSet[type[Node]] = WeakSet()
 """Cache of valid classes: they are checked for every pipeline, and an edited class is a new object."""
 
@@ -53,87 +55,79 @@ def declaration_mistakes(cls: type[Node], *, lenient: bool = False) -> list[Prob
         return []
     for name in _CLASS_METHODS:
         if getattr_static(cls, name) is not vars(Node)[name]:
-            return [_problem(name, f"'{name}' is reserved by the node's base class; choose another name")]
+            text = f"'{name}' is reserved by the node's base class; choose another name"
+            return [Problem("RG490", text, subject=name)]
     try:
         cls.parameters()
     except Exception as error:  # evaluating an annotation can raise anything
         named = [name for name, hint in get_annotations(cls).items() if str(getattr(error, "name", None)) in str(hint)]
         text = f"the types of its parameters cannot be resolved: {describe_error(error)}"
-        return [_problem(next(iter(named), ""), text)]
+        return [Problem("RG490", text, subject=next(iter(named), ""))]
     docs = [] if lenient else _docs(cls)
     found = [*_names(cls, lenient), *docs, *_ports(cls), *_macros(cls), *_parameters(cls)]
     if not found and not lenient:
         _SOUND.add(cls)
-    return found
+    return [Problem("RG490", text, subject=subject) for subject, text in found]
 
 
-def _problem(subject: str, text: str) -> Problem:
-    return Problem("RG490", text, subject=subject)
-
-
-def _names(cls: type[Node], lenient: bool) -> Iterator[Problem]:
+def _names(cls: type[Node], lenient: bool) -> Mistakes:
     ports, parameters = cls.ports(), cls.parameters()
     plan = {name for name in parameters if parameters[name].role == "structural"}  # these never reach a shader
     for name in [*ports, *parameters]:
         if name.startswith("gl_") or "__" in name or not _IDENTIFIER.match(name.lower() if lenient else name):
-            yield _problem(name, f"'{name}' is not a lower-case GLSL identifier")
+            yield name, f"'{name}' is not a lower-case GLSL identifier"
         elif name in (_OF_THE_BASE if name in plan else RESERVED_NAMES):
-            text = f"'{name}' is reserved by GLSL or by the node's base class; choose another name"
-            yield _problem(name, text)
+            yield name, f"'{name}' is reserved by GLSL or by the node's base class; choose another name"
     for name in sorted(set(ports) & set(parameters)):
-        yield _problem(name, f"'{name}' is both a port and a parameter")
+        yield name, f"'{name}' is both a port and a parameter"
     given = {f"{name}_{word}": (name, word) for name in ports for word in ("views", "lights")}
     for name in [*ports, *(name for name in parameters if name not in plan)]:
         if name in given:
             port, word = given[name]
-            yield _problem(name, f"'{name}' is what shaders are given for the {word} of port '{port}'; rename one")
+            yield name, f"'{name}' is what shaders are given for the {word} of port '{port}'; rename one"
     named = [getattr(port, "group", None) for port in ports.values()]
     for group in dict.fromkeys(group for group in named if isinstance(group, str)):
         if group in ports or group in parameters:
-            yield _problem(group, f"group '{group}' has the name of a port or parameter")
+            yield group, f"group '{group}' has the name of a port or parameter"
     inherited = {name for base in cls.__mro__[1:] if issubclass(base, Node) for name in base.ports()}
+    known = {"shader", "twin", *inherited, *parameters}
     for name, value in vars(cls).items():
-        if (
-            value is None
-            and name not in ("shader", "twin")
-            and name[0] != "_"
-            and name not in {*inherited, *parameters}
-        ):
-            yield _problem(name, f"'{name}' is None, which drops a port that a base declares; none declares '{name}'")
+        if value is None and name[0] != "_" and name not in known:
+            yield name, f"'{name}' is None, which drops a port that a base declares; none declares '{name}'"
     for name, takes in _METHODS.items():
         code = getattr(getattr(cls, name), "__code__", None)
         if code is None or code is vars(Node)[name].__code__ or code.co_flags & _TAKES_ANY:
             continue
         named = code.co_varnames[: code.co_argcount]
         if not len(named) - len(getattr(cls, name).__defaults__ or ()) <= 2 <= len(named):
-            yield _problem(name, f"`{name}` takes ({', '.join(named)}); declare it as {name}({takes})")
+            yield name, f"`{name}` takes ({', '.join(named)}); declare it as {name}({takes})"
     shader = cls.shader
     if shader is not None and (not isinstance(shader, str) or not shader.endswith((".frag", ".comp"))):
-        yield _problem("shader", f"`shader` is {shader!r}; it is a file that ends in .frag or .comp")
+        yield "shader", f"`shader` is {shader!r}; it is a file that ends in .frag or .comp"
     if cls.twin is not None and not (isinstance(cls.twin, str) and cls.twin.isidentifier()):
-        yield _problem("twin", f"`twin` is {cls.twin!r}; it is the name of a node type, such as 'traced_shadows'")
+        yield "twin", f"`twin` is {cls.twin!r}; it is the name of a node type, such as 'traced_shadows'"
 
 
-def _docs(cls: type[Node]) -> Iterator[Problem]:
+def _docs(cls: type[Node]) -> Mistakes:
     if not (cls.__doc__ or "").strip() or cls.__doc__ == Node.__doc__:
-        yield _problem("", "the class has no docstring")
+        yield "", "the class has no docstring"
     for name, port in cls.ports().items():
         doc = getattr(port, "doc", "")
         if isinstance(doc, str) and not doc and not isinstance(port, Internal | History):
-            yield _problem(name, f"port '{name}' has no doc")
+            yield name, f"port '{name}' has no doc"
     for name, parameter in cls.parameters().items():
         if parameter.role == "plain":
-            yield _problem(name, f"parameter '{name}' is a plain value; declare it with {_ROLES}")
+            yield name, f"parameter '{name}' is a plain value; declare it with {_ROLES}"
         elif not parameter.doc:
-            yield _problem(name, f"parameter '{name}' has no doc")
+            yield name, f"parameter '{name}' has no doc"
 
 
-def _ports(cls: type[Node]) -> Iterator[Problem]:
+def _ports(cls: type[Node]) -> Mistakes:
     ports = cls.ports()
     for name, port in ports.items():
-        wrong = list(mistakes_of(port, f"port '{name}'", name))
+        wrong = [mistake.text for mistake in mistakes_of(port, f"port '{name}'", name)]
         # Fields are compared only if each is valid on its own.
-        yield from wrong or (_problem(name, text) for text in (*_alone(name, port), *_named(name, port, ports)))
+        yield from ((name, text) for text in wrong or (*_alone(name, port), *_named(name, port, ports)))
 
 
 def _alone(name: str, port: Port) -> Iterator[str]:
@@ -182,7 +176,7 @@ def _named(name: str, port: Port, ports: Mapping[str, Port]) -> Iterator[str]:
             yield f"port '{name}': {key}: '{target}' is not {expected}"
 
 
-def _macros(cls: type[Node]) -> Iterator[Problem]:
+def _macros(cls: type[Node]) -> Mistakes:
     """Yield declarations that would define the same macro."""
     made: dict[str, list[tuple[str, str]]] = {}  # macro to the names that define it, with their descriptions
     for name in cls.inputs():
@@ -197,45 +191,44 @@ def _macros(cls: type[Node]) -> Iterator[Problem]:
     for macro, sources in made.items():
         (name, first), words = sources[0], " and ".join(source for _, source in sources)
         if macro in _OF_THE_FRAMEWORK:
-            text = f"{first} would define the macro {macro}, which is rendergraph's own; choose another name"
-            yield _problem(name, text)
+            yield name, f"{first} would define the macro {macro}, which is rendergraph's own; choose another name"
         if len(sources) > 1:
-            yield _problem(name, f"{words} would define the same macro, {macro}; rename one")
+            yield name, f"{words} would define the same macro, {macro}; rename one"
 
 
-def _parameters(cls: type[Node]) -> Iterator[Problem]:
+def _parameters(cls: type[Node]) -> Mistakes:
     sound = True
     for name, parameter in cls.parameters().items():
         if parameter.type is None:
-            yield _problem(name, f"parameter '{name}' has no type; write it as in `{name}: float = param(…)`")
+            yield name, f"parameter '{name}' has no type; write it as in `{name}: float = param(…)`"
             sound = False
             continue
         if parameter.open_name and str not in get_args(parameter.type):
-            yield _problem(name, f"plugins add choices to '{name}', so its type is a Literal of its own `| str`")
+            yield name, f"plugins add choices to '{name}', so its type is a Literal of its own `| str`"
         if parameter.role in ("param", "define") and (wrong := _not_for_a_shader(parameter)):
-            yield _problem(name, f"parameter '{name}' is {wrong}")
+            yield name, f"parameter '{name}' is {wrong}"
         if parameter.unless and not any(parameter.unless in vars(base) for base in cls.__mro__):  # it may be dropped
             hint = suggestion(parameter.unless, cls.inputs())
-            yield _problem(name, f"parameter '{name}': unless: there is no input '{parameter.unless}'{hint}")
+            yield name, f"parameter '{name}': unless: there is no input '{parameter.unless}'{hint}"
         wrong_limits = list(_limits(parameter))
         yield from wrong_limits
         sound = sound and not wrong_limits
         if parameter.glsl and not re.fullmatch(r"(float|int|uint|bool|[biu]?vec[234]|mat[234])", str(parameter.glsl)):
-            yield _problem(name, f"parameter '{name}': glsl: {parameter.glsl!r} is not the GLSL type of a parameter")
+            yield name, f"parameter '{name}': glsl: {parameter.glsl!r} is not the GLSL type of a parameter"
     if sound:
         yield from _defaults(cls)
 
 
-def _limits(parameter: Parameter) -> Iterator[Problem]:
+def _limits(parameter: Parameter) -> Mistakes:
     name, limits = parameter.name, parameter.limits
-    wrong = [*mistakes_in(f"parameter '{name}': min", limits.low, float | None, name)]
-    wrong += mistakes_in(f"parameter '{name}': max", limits.high, float | None, name)
+    wrong = [*mistakes_in(f"parameter '{name}': min", limits.low, float | None)]
+    wrong += mistakes_in(f"parameter '{name}': max", limits.high, float | None)
+    yield from ((name, mistake.text) for mistake in wrong)
     if not wrong and limits.empty:
-        wrong = [_problem(name, f"parameter '{name}' has an empty range: min {limits.low} > max {limits.high}")]
-    yield from wrong
+        yield name, f"parameter '{name}' has an empty range: min {limits.low} > max {limits.high}"
 
 
-def _defaults(cls: type[Node]) -> Iterator[Problem]:
+def _defaults(cls: type[Node]) -> Mistakes:
     """Check defaults like values in a file."""
     sound = True
     for name, parameter in cls.parameters().items():
@@ -245,7 +238,7 @@ def _defaults(cls: type[Node]) -> Iterator[Problem]:
         except (TypeError, ValueError) as error:
             wrong = str(error)
         if wrong and parameter.role != "plain":
-            yield _problem(name, f"the default of '{name}', {quoted(parameter.default)}, is wrong: {wrong}")
+            yield name, f"the default of '{name}', {quoted(parameter.default)}, is wrong: {wrong}"
         sound = sound and not wrong
     try:
         if sound:
@@ -253,7 +246,7 @@ def _defaults(cls: type[Node]) -> Iterator[Problem]:
     except BaseException as error:  # a node's own check is third-party code
         if is_interruption(error):
             raise
-        yield _problem("", f"it cannot be instantiated with its defaults: {describe_error(error)}")
+        yield "", f"it cannot be instantiated with its defaults: {describe_error(error)}"
 
 
 def _not_for_a_shader(parameter: Parameter) -> str:
@@ -262,10 +255,8 @@ def _not_for_a_shader(parameter: Parameter) -> str:
     if parameter.role == "param":
         if kinds <= {bool, int, float, Literal} and not parameter.words:
             return ""
-        return (
-            "a param, so its type is a number, a switch or a tuple of them; make text a define with its choices as "
-            "Literal[…]"
-        )
+        kinds_of_param = "a number, a switch or a tuple of them"
+        return f"a param, so its type is {kinds_of_param}; make text a define with its choices as Literal[…]"
     fits = kinds <= {bool, int, float, Literal, *([str] if parameter.open_name else [])}
     if fits and not accepts(parameter.type, tuple) and all(map(_MACRO.fullmatch, parameter.words)):
         return ""

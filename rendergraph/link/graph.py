@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from msgspec import Struct, field
 
 from rendergraph.catalog import NodeType
-from rendergraph.declare import Facts, Node, Texel, TextureInfo
+from rendergraph.declare import Facts, Node, TextureInfo
 from rendergraph.document import Value
 from rendergraph.errors import Place, Problem
 from rendergraph.facts import SELECTIONS
+from rendergraph.ports import Texel
 from rendergraph.textures import Sampler
 
 if TYPE_CHECKING:

@@ -13,13 +13,13 @@ from typing import Annotated, Any, NoReturn, Optional
 import msgspec
 
 from rendergraph import textures
-from rendergraph.declare import Facts, Function, InOut, Input, Node, Port, Texel, TextureInfo, Views, WrittenPort
+from rendergraph.declare import Facts, Function, InOut, Input, Node, Port, TextureInfo, Views, WrittenPort
 from rendergraph.declare.blame import author_problem
 from rendergraph.document import shown
 from rendergraph.errors import Problem, SceneError, is_interruption, node_named
 from rendergraph.link.graph import Endpoint
 from rendergraph.link.nodes import UnlinkedNode
-from rendergraph.ports import Count, FormatName, Positive, Samples, Sides
+from rendergraph.ports import Count, FormatName, Positive, Samples, Sides, Texel
 from rendergraph.textures import MOST_SIDE, Filter, Sampler, Semantic, TextureDesc, full_mip_count
 from rendergraph.typecheck import fits, quoted, words_for
 

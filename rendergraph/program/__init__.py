@@ -14,20 +14,5 @@ knows; the same holds for other functions, by their name.
 
 from __future__ import annotations
 
-from rendergraph.program.checks import (
-    Texts,
-    check_kept_text,
-    check_scene_includes,
-    check_texts,
-    missing,
-    named_reads,
-    ray_warnings,
-    unbound_block,
-    unbound_sampler,
-    unfit_outputs,
-    unfit_sampler,
-    unset_uniform,
-    used_blocks,
-    used_names,
-)
+from rendergraph.program.checks import check_texts, ray_warnings, used_blocks, used_names
 from rendergraph.program.text import StageText, StepTexts, positions_macro, prefix, stage_texts, text_key

@@ -61,7 +61,7 @@ def check_texts(
     seen: set[object] = set()
     for step in steps:
         kinds = tuple((name, sampler_of(read, resources[read.resource])) for name, read in _sampled(step, resources))
-        names = uniform_kinds(step)
+        names = _uniform_kinds(step)
         key = step.type, step.shaders, step.defines, step.functions, kinds, names, _kept(step, resources)
         if not step.shaders or key in seen:
             continue  # same text as another step
@@ -77,25 +77,17 @@ def check_texts(
 
 
 def _check_step(
-    step: Step,
-    types: Mapping[str, NodeType],
-    resources: Mapping[str, Resource],
-    views: Mapping[str, ViewTable],
+    step: Step, types: Mapping[str, NodeType], resources: Mapping[str, Resource], views: Mapping[str, ViewTable]
 ) -> tuple[Problem, ...]:
-    texts = stage_texts(step, types, resources, views)
+    texts, cls = stage_texts(step, types, resources, views), types[step.node].cls
     check_scene_includes(step, texts, types)
-    check_kept_text(step, partial(dict, texts), types[step.node].cls, resources)
+    check_kept_text(step, lambda: texts, cls, resources)
     _check_samplers(step, texts, resources)
-    _check_outs(step, texts, types[step.node].cls, resources)
-    found = missing(step, texts, types[step.node].cls)
-    if any(problem.severity == "error" for problem in found):
-        raise InputError([problem for problem in found if problem.severity == "error"])
+    _check_outs(step, texts, cls, resources)
+    found = missing(step, texts, cls)
+    if errors := [problem for problem in found if problem.severity == "error"]:
+        raise InputError(errors)
     return (*found, *(warning for text in texts.values() for warning in text.warnings))
-
-
-def missing(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> list[Problem]:
-    """Return problems about names that a step's shaders use but nothing provides, at the lines of the shaders."""
-    return [_placed(problem, text, [name]) for text, name, problem in unbound(step, texts, cls)]
 
 
 def sampler_of(read: Read, resource: Resource) -> str:
@@ -217,13 +209,11 @@ def check_scene_includes(step: Step, texts: Mapping[str, StageText], types: Mapp
                 continue
             while origin.by is not None and origin.shared:
                 origin = origin.by
-            trace = name == "trace.glsl"
             lacks = f"it includes <{name}>, but does not read {'rays' if step.reads_scene else 'the scene'}; "
-            way = (
-                f"declare `scene = Input(SceneData{', rays=True' if trace else ''})` and give the step scene=self.scene"
-            )
+            in_python, in_header = (", rays=True", ", rays: true") if name == "trace.glsl" else ("", "")
+            way = f"declare `scene = Input(SceneData{in_python})` and give the step scene=self.scene"
             if types[step.node].is_shader:
-                way = f"add scene: {{semantic: scene_data{', rays: true' if trace else ''}}} to `inputs` of its header"
+                way = f"add scene: {{semantic: scene_data{in_header}}} to `inputs` of its header"
             problem = step.problem("RG430", lacks + way)
             problems.append(problem.relocate(origin.place(), f"#include <{name}>"))
     if problems:
@@ -322,11 +312,12 @@ def unset_uniform(step: Step, name: str) -> str:
     return f"{_files(step)} uses uniform '{name}', which nothing sets{hint}"
 
 
-def unbound(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> Iterator[tuple[StageText, str, Problem]]:
-    """Yield stage, name and problem of everything that authors' shaders use but the step does not provide as declared.
+def missing(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> list[Problem]:
+    """Return problems about what authors' shaders use but the step does not provide as declared, at their lines.
 
     Code that a constant condition might exclude gives warnings.
     """
+    problems: list[Problem] = []
     for text in texts.values():
         blocks = [block for block in text.source.blocks if block.origin.file is not None and not block.origin.shared]
         own = "\n".join("\n".join(block.lines) for block in blocks)
@@ -342,18 +333,16 @@ def unbound(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> Iter
         members = {block: named for _, block, named in declared_blocks(declared)} if has_blocks else {}
         for code, name, pattern, describe in found:
             if not names.isdisjoint(members.get(name, {name})) and re.search(pattern, declared):
-                problem = step.problem(code, describe())
-                undeclared = name.endswith("_views")
-                yield text, name, problem if undeclared or not _CONSTANT_IF.search(own) else problem.as_warning()
+                problem = _placed(step.problem(code, describe()), text, [name])
+                is_certain = name.endswith("_views") or not _CONSTANT_IF.search(own)
+                problems.append(problem if is_certain else problem.as_warning())
+    return problems
 
 
-def uniform_kinds(step: Step) -> tuple[tuple[str, int, bool], ...]:
+def _uniform_kinds(step: Step) -> tuple[tuple[str, int, bool], ...]:
     """Return the uniforms of a step with their numbers of values, and whether the values are floats."""
-    found = []
-    for name, value in step.uniforms:
-        numbers = value if isinstance(value, tuple | list) else (value,)
-        found.append((name, len(numbers), any(isinstance(number, float) for number in numbers)))
-    return tuple(found)
+    rows = [(name, value if isinstance(value, tuple | list) else (value,)) for name, value in step.uniforms]
+    return tuple((name, len(row), any(isinstance(number, float) for number in row)) for name, row in rows)
 
 
 def _suspects(step: Step, own: str, whole: str, cls: type[Node]) -> Iterator[tuple[str, str, str, Callable[[], str]]]:
@@ -361,7 +350,7 @@ def _suspects(step: Step, own: str, whole: str, cls: type[Node]) -> Iterator[tup
     uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
     given = {use.name for use in uses}
     given |= {prefix(each.node) + read.name for each in step.functions for read in each.reads}
-    kinds = {name: (count, floats) for name, count, floats in uniform_kinds(step)}
+    kinds = {name: (count, floats) for name, count, floats in _uniform_kinds(step)}
     set_names = {prefix(each.node) + name for each in step.functions for name, _ in each.uniforms}
     set_names |= {"view_index", *kinds, *given}
     uniforms = "".join(own[max(found.start() - 1, 0) : found.end()] for found in _UNIFORMS.finditer(own))

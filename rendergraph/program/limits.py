@@ -42,11 +42,7 @@ def check_plan(limits: Mapping[str, int], plan: ResourcePlan, views: Mapping[str
 
 
 def beyond_guaranteed(
-    plan: ResourcePlan,
-    views: Mapping[str, ViewTable],
-    types: Mapping[str, NodeType],
-    scene: Scene,
-    packed: PackedScene,
+    plan: ResourcePlan, views: Mapping[str, ViewTable], types: Mapping[str, NodeType], scene: Scene, packed: PackedScene
 ) -> list[Problem]:
     """Return everything in a plan and its programs that some OpenGL 4.5 driver may not support."""
     problems = [*_samples(plan, GUARANTEED, _MINIMAL), *_excesses(GUARANTEED, plan, views, _MINIMAL)]

@@ -71,9 +71,8 @@ def compile_problems(message: str, text: StageText) -> list[Problem]:
     found = _located(message.splitlines(), text, "RG410")
     if found:
         return found
-    where = _first_place(text.source)
     plain = " ".join(message.split()) or "the driver refused the shader without a reason"
-    return [Problem("RG410", f"{text.who}: {plain}", where.place() if where else None)]
+    return [Problem("RG410", f"{text.who}: {plain}", _first_place(text.source))]
 
 
 def link_problems(message: str, texts: Mapping[str, StageText]) -> list[Problem]:
@@ -97,14 +96,12 @@ def link_problems(message: str, texts: Mapping[str, StageText]) -> list[Problem]
     text = f"{last.of_node}the stages {', '.join(texts)} do not link: {text}"
     lacking = _LACKS.search(text)
     if lacking and lacking[1] in texts:  # the message names what is missing
-        where = _first_place(texts[lacking[1]].source)
-        return [Problem("RG411", text, where.place() if where else None)]
+        return [Problem("RG411", text, _first_place(texts[lacking[1]].source))]
     for stage_text in reversed(list(texts.values())):
         spot = declared_at(stage_text.source, _QUOTED.findall(message))
         if spot is not None:
             return [Problem("RG411", text, *spot)]
-    where = _first_place(last.source)
-    return [Problem("RG411", text, where.place() if where else None)]
+    return [Problem("RG411", text, _first_place(last.source))]
 
 
 def declared_at(source: SourceText, names: Sequence[str], *, mentions: bool = True) -> tuple[Place, str] | None:
@@ -143,8 +140,7 @@ def _problem(code: str, message: DriverMessage, stage: StageText) -> Problem:
     rows, text, line = stage.source, message.text.strip(), message.line
     severity: Literal["error", "warning"] = "warning" if message.is_warning else "error"
     if not 1 <= line <= len(rows.lines):  # about the whole text, such as recursion
-        first = _first_place(rows)
-        spot = declared_at(rows, _FUNCTION.findall(text)) or (first.place() if first else None, "")
+        spot = declared_at(rows, _FUNCTION.findall(text)) or (_first_place(rows), "")
         return Problem(code, f"{stage.who}: {text}", *spot, severity)
     origin, shown_line = rows.origins[line - 1], rows.lines[line - 1]
     column = _unsqueezed(shown_line, message.column)
@@ -153,18 +149,12 @@ def _problem(code: str, message: DriverMessage, stage: StageText) -> Problem:
         column = len(shown_line[: column - 1].replace(origin.prefix, "")) + 1
         shown_line = shown_line.replace(origin.prefix, "")
     if origin.file is None:
-        near = _nearest_author(rows, shown_line, text)
+        place = _nearest_author(rows, shown_line, text)
         what = f"what rendergraph writes for {origin.purpose}" if origin.purpose else "generated text"
         text += f" (in {what}: {shown_line.strip()})"
-        place = near.place() if near else None
         return Problem(code, f"{stage.who}: {text}", place, severity=severity)
-    macro = _macro(rows, shown_line, text)
-    if macro is not None:
-        column, where = macro
-        text += where
-    else:
-        column = _of_name(shown_line, text, column)
-    text += _included(origin)
+    column, where = _macro(rows, shown_line, text) or (_of_name(shown_line, text, column), "")
+    text += where + _included(origin)
     return Problem(code, f"{stage.who}: {text}", origin.place(column), shown_line, severity)
 
 
@@ -212,33 +202,19 @@ def _included(origin: Origin) -> str:
     return f" (included at {place.file}:{place.line})" if place is not None else ""
 
 
-def _first_place(source: SourceText) -> Origin | None:
+def _first_place(source: SourceText) -> Place | None:
     """Return the first line of the author's own file, which is last in the text."""
-    last = next((origin for origin in reversed(source.origins) if origin.file is not None and origin.by is None), None)
-    return Origin(last.file, 1) if last else None
+    own = (origin.file for origin in reversed(source.origins) if origin.file is not None and origin.by is None)
+    return Origin(next(own, None), 1).place()
 
 
-def _nearest_author(source: SourceText, line: str, message: str) -> Origin | None:
-    """Return the first line of an author's file that contains a name of a generated line."""
-    own = [
-        (text, origin)
-        for text, origin in zip(source.lines, source.origins, strict=True)
-        if origin.file is not None and not origin.shared
-    ]
-    for name in _names(line, message):
-        pattern = re.compile(rf"\b{re.escape(name)}\b")
-        for text, origin in own:
-            if pattern.search(text):
-                return origin
+def _nearest_author(source: SourceText, line: str, message: str) -> Place | None:
+    """Return the first line of an author's file with a name that the driver quotes, else the longest of the line."""
+    words = set(_WORD.findall(line)) - {"define", "uniform", "layout", "const", "float", "int"}
+    for name in (*_QUOTED.findall(message), *sorted(words, key=len, reverse=True)):
+        if found := mentioned_at(source, [name]):
+            return replace(found[0], column=1)
     return _first_place(source)
-
-
-def _names(line: str, message: str) -> Iterator[str]:
-    """Yield the names that the driver quotes, then the longest of the line."""
-    yield from _QUOTED.findall(message)
-    yield from sorted(set(_WORD.findall(line)) - {"define", "uniform", "layout", "const", "float", "int"}, key=len)[
-        ::-1
-    ]
 
 
 # --- causes -----------------------------------------------------------------------------------------------------------

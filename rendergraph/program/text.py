@@ -123,20 +123,12 @@ def text_key(
         type = types[node]
         return type.cls, type.file, type.shaders, type.inherited
 
-    return (
-        made_of(step.node),
-        replace(step, **_IRRELEVANT),
-        tuple(
-            (
-                replace(each, reads=(), uniforms=tuple((name, 0) for name, _ in each.uniforms)),
-                made_of(each.node),
-                tuple(seen(use) for use in each.reads),
-            )
-            for each in step.functions
-        ),
-        tuple(seen(use) for use in step.reads),
-        tuple(seen(use) for use in step.writes),
-    )
+    def provided(each: FunctionBinding) -> Hashable:
+        names = tuple((name, 0) for name, _ in each.uniforms)
+        return replace(each, reads=(), uniforms=names), made_of(each.node), tuple(map(seen, each.reads))
+
+    functions, uses = tuple(map(provided, step.functions)), tuple(map(seen, (*step.reads, *step.writes)))
+    return made_of(step.node), replace(step, **_IRRELEVANT), functions, uses
 
 
 class StepTexts(Struct, eq=False):
@@ -237,9 +229,7 @@ class _Program(Struct, frozen=True):
 
     def _light_table(self, signature: Signature) -> Iterator[str]:
         """Yield the lights that any provider or texture of the function knows, for shaders that need them."""
-        reads = [
-            read for binding in self.step.functions if binding.signature == signature.name for read in binding.reads
-        ]
+        reads = [read for one in self.step.functions if one.signature == signature.name for read in one.reads]
         reads += screen_reads(signature, self.step, self.types[self.step.node])
         known = list(dict.fromkeys(light for read in reads for light in self._lights(read)))
         yield f"#define {signature.name.upper()}_LIGHT_COUNT {len(known)}"
@@ -263,27 +253,17 @@ class _Program(Struct, frozen=True):
                 raise InputError(Problem("RG408", text, Origin(file, 1).place()))
         macros = {**read_defines(binding.reads, self.resources, self.views), **dict(binding.defines)}
         names |= {*macros, *(name for name, _ in binding.uniforms), *node.cls.parameters()}
+        endings = ("_LAYERS", "_SAMPLES", "_SAMPLE_POSITIONS", "_COUNT", "_VIEW_COUNT")
         for port in (*node.cls.ports(), *(read.name for read in binding.reads)):
-            endings = ("_LAYERS", "_SAMPLES", "_SAMPLE_POSITIONS", "_COUNT", "_VIEW_COUNT")
-            names |= {
-                port,
-                f"{port}_views",
-                f"previous_{port}_views",
-                f"{port}_lights",
-                f"HAS_{port.upper()}",
-                *(port.upper() + e for e in endings),
-            }
+            names |= {port, f"{port}_views", f"previous_{port}_views", f"{port}_lights", f"HAS_{port.upper()}"}
+            names |= {port.upper() + ending for ending in endings}
 
         def rename(word: str) -> str:
             return before + word if word in names else word
 
         lines = iter(renamed(own.text, rename).split("\n"))
-        final = SourceText(
-            tuple(
-                block if block.origin.shared else SourceBlock(tuple(islice(lines, len(block.lines))), block.origin)
-                for block in source.blocks
-            )
-        )
+        blocks = (b if b.origin.shared else replace(b, lines=tuple(islice(lines, len(b.lines)))) for b in source.blocks)
+        final = SourceText(tuple(blocks))
         head = _macro_text({before + key: renamed(value, rename) for key, value in macros.items()})
         return head + _read_declarations(binding.reads, self.resources, before, final.text) + final
 
@@ -305,16 +285,12 @@ def _read_declarations(reads: Iterable[Read], resources: Mapping[str, Resource],
         resource = resources.get(read.resource)
         if resource is None or not isinstance(resource.desc, TextureDesc):
             continue
-        name, macro = before + read.name, before + read.name.upper()
-        if resource.view is not None and mentions(body, f"{name}_views"):
-            block = f"layout(std140) uniform {name}_view_block {{ View {name}_views[{macro}_VIEW_COUNT]; }};"
-            text += generated([block], f"the views of '{read.name}'")
-        if resource.view is not None and not read.previous and mentions(body, f"{before}previous_{read.name}_views"):
-            block = (
-                f"layout(std140) uniform {before}previous_{read.name}_view_block "
-                f"{{ View {before}previous_{read.name}_views[{macro}_VIEW_COUNT]; }};"
-            )
-            text += generated([block], f"the views of '{read.name}' in the previous frame")
+        name, count = before + read.name, f"{before}{read.name.upper()}_VIEW_COUNT"
+        tables = {name: ""} if read.previous else {name: "", f"{before}previous_{read.name}": " in the previous frame"}
+        for table, when in tables.items() if resource.view is not None else ():
+            if mentions(body, f"{table}_views"):
+                block = f"layout(std140) uniform {table}_view_block {{ View {table}_views[{count}]; }};"
+                text += generated([block], f"the views of '{read.name}'{when}")
         if resource.lights and mentions(body, f"{name}_lights"):
             table = ", ".join(str(light) for light in resource.lights)
             line = f"const int {name}_lights[{len(resource.lights)}] = int[]({table});"
@@ -342,11 +318,7 @@ def screen_reads(signature: Signature, step: Step, node: NodeType) -> list[Read]
     names = [
         name
         for name, port in node.cls.inputs().items()
-        if isinstance(port, Input)
-        and port.kind in TEXTURE_KINDS
-        and port.semantic is not None
-        and signature.texture is not None
-        and port.semantic.name == signature.texture
+        if isinstance(port, Input) and port.kind in TEXTURE_KINDS and port.semantic.name == signature.texture
     ]
     wanted = re.compile(rf"(?:{'|'.join(names)})(?:_\d+)?\Z") if names else None
     return [read for read in step.reads if wanted and wanted.match(read.name) and read.use == "sample"]

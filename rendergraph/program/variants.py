@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -64,42 +65,30 @@ def storage_blocks(packed: PackedScene, largest_block: int) -> frozenset[str]:
 
 def light_macros(scene: Scene, stored: Collection[str]) -> dict[str, str]:
     kinds = [light.type for light in scene.lights]
-    macros = {
-        "LIGHT_COUNT": str(len(kinds)),
-        "LIGHT_DIRECTIONALS": str(kinds.count("directional")),
-        "LIGHT_POINTS": str(kinds.count("point")),
-        "LIGHT_SPOTS": str(kinds.count("spot")),
-    }
-    if "light_block" in stored:
-        macros["LIGHT_STORAGE"] = "1"
-    return macros
+    macros = {"LIGHT_COUNT": str(len(kinds))}
+    macros |= {f"LIGHT_{kind.upper()}S": str(kinds.count(kind)) for kind in ("directional", "point", "spot")}
+    return macros | ({"LIGHT_STORAGE": "1"} if "light_block" in stored else {})
 
 
 def scene_macros(scene: Scene, packed: PackedScene, stored: Collection[str]) -> dict[str, str]:
     """Return macros about objects and materials, for geometry steps; unused features are not compiled."""
-    macros = {"MATERIAL_COUNT": str(max(1, len(scene.materials)))}
     moving = {section for section, *_ in scene.tracks}
-    if packed.vertex_orders:
-        macros["SCENE_POSED"] = "1"
-    if "objects" not in moving and not scene.rigs and _evenly_scaled(packed.instances["rows"]):
-        macros["UNIFORM_SCALE"] = "1"
-    if "materials" not in moving:
-        textured = {slot for material in scene.materials for slot in material.textures}
-        table, default = packed.materials, pack.pack_materials([Material("default")])
-        if not table["emissive"][:, :3].any():
-            macros["NO_EMISSIVE"] = "1"
-        same = (table["specular"] == default["specular"]).all() and (table["extra"] == default["extra"])[:, 0].all()
-        if same and not textured & {"specular", "specular_color"}:
-            macros["DEFAULT_SPECULAR"] = "1"
-    if packed.materials.dtype == pack.LAYERED_MATERIAL:
-        macros["LAYERED_MATERIALS"] = "1"
-    if (slots := pack.slot_count(scene.materials)) > 8:
-        macros["MATERIAL_SLOTS"] = str(slots)
-    if "material_block" in stored:
-        macros["MATERIAL_STORAGE"] = "1"
-    if "material_uv_block" in stored:
-        macros["MATERIAL_UV_STORAGE"] = "1"
-    return macros
+    textured = {slot for material in scene.materials for slot in material.textures}
+    table, default = packed.materials, pack.pack_materials([Material("default")])
+    same = (table["specular"] == default["specular"]).all() and (table["extra"] == default["extra"])[:, 0].all()
+    slots = pack.slot_count(scene.materials)
+    macros: dict[str, Any] = {
+        "MATERIAL_COUNT": max(1, len(scene.materials)),
+        "SCENE_POSED": bool(packed.vertex_orders),
+        "UNIFORM_SCALE": not (moving & {"objects"} or scene.rigs) and _evenly_scaled(packed.instances["rows"]),
+        "NO_EMISSIVE": "materials" not in moving and not table["emissive"][:, :3].any(),
+        "DEFAULT_SPECULAR": "materials" not in moving and same and not textured & {"specular", "specular_color"},
+        "LAYERED_MATERIALS": table.dtype == pack.LAYERED_MATERIAL,
+        "MATERIAL_SLOTS": slots if slots > 8 else 0,
+        "MATERIAL_STORAGE": "material_block" in stored,
+        "MATERIAL_UV_STORAGE": "material_uv_block" in stored,
+    }
+    return {name: str(int(value)) for name, value in macros.items() if value}
 
 
 def _evenly_scaled(rows: npt.NDArray[np.float32]) -> bool:
@@ -128,15 +117,11 @@ def features(scene: Scene, index: int, level: str) -> tuple[dict[str, str], dict
     defines: dict[str, str] = {}
     if level == "none":
         return defines, {}
-    masked = material.alpha_mode == "mask"
-    slots = (
-        material.textures
-        if level == "full"
-        else {slot: texture for slot, texture in material.textures.items() if masked and slot == "base_color"}
-    )
+    masked, full = material.alpha_mode == "mask", level == "full"
     found: dict[str, Texture] = {}
-    for slot, texture in slots.items():
-        if (mesh.uv1 if texture.uv else mesh.uv0) is None:
+    for slot, texture in material.textures.items():
+        used = full or (masked and slot == "base_color")
+        if not used or (mesh.uv1 if texture.uv else mesh.uv0) is None:
             continue
         defines[f"HAS_{slot.upper()}_TEXTURE"] = "1"
         defines[f"{slot.upper()}_UV"] = str(texture.uv)
@@ -144,21 +129,12 @@ def features(scene: Scene, index: int, level: str) -> tuple[dict[str, str], dict
         if texture.transform is not None:
             defines["HAS_UV_TRANSFORM"] = "1"
         found[f"{slot}_texture"] = texture
-    if masked:
-        defines["ALPHA_MASK"] = "1"
-    if mesh.colors is not None and (masked or level == "full"):
-        defines["HAS_VERTEX_COLOR"] = "1"
-    if level == "full":
-        if material.alpha_mode == "blend":
-            defines["ALPHA_BLEND"] = "1"
-        if material.double_sided:
-            defines["DOUBLE_SIDED"] = "1"
-        if material.unlit:
-            defines["UNLIT"] = "1"
-        if scene.has_grain(material):
-            defines["ANISOTROPIC"] = "1"
-        defines |= {f"HAS_{layer.upper()}": "1" for layer in scene.layers(material)}
-        bumpy = "normal" in slots or "clearcoat_normal" in slots
-        if mesh.tangents is not None and (bumpy or scene.has_grain(material)):
-            defines["HAS_TANGENT"] = "1"
-    return defines, found
+    flags = {"ALPHA_MASK": masked, "HAS_VERTEX_COLOR": mesh.colors is not None and (masked or full)}
+    if full:
+        has_grain = scene.has_grain(material)
+        is_bumpy = "normal" in material.textures or "clearcoat_normal" in material.textures
+        flags |= {"ALPHA_BLEND": material.alpha_mode == "blend", "DOUBLE_SIDED": material.double_sided}
+        flags |= {"UNLIT": material.unlit, "ANISOTROPIC": has_grain}
+        flags |= {f"HAS_{layer.upper()}": True for layer in scene.layers(material)}
+        flags["HAS_TANGENT"] = mesh.tangents is not None and (is_bumpy or has_grain)
+    return defines | {name: "1" for name, holds in flags.items() if holds}, found

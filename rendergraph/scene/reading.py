@@ -18,8 +18,8 @@ import numpy.typing as npt
 from msgspec import Struct, field
 from msgspec.structs import replace
 
-from rendergraph.declare import NO_EXTENSIONS, READ_IMAGES, Added, Extensions, MeshData
-from rendergraph.declare.extensions import ImageLoader, MeshLoader
+from rendergraph.declare import NO_EXTENSIONS, Added, Extensions, MeshData
+from rendergraph.declare.extensions import READ_IMAGES, ImageLoader, MeshLoader
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.pipelines import formats
@@ -169,7 +169,7 @@ class Reading(Struct):
             if path.suffix.lower() == ".npy":
                 loader = Added(".npy", _read_npy, "rendergraph", path)
             elif path.suffix.lower() not in ("", *READ_IMAGES):
-                loader = self.extensions.image_loader(path.suffix)
+                loader = self.extensions.loader("images", path.suffix)
             source = ImageSource(path, None, shown(path.name), loader)
             if loader is None:
                 source = self._checked(source, f"{what} '{self._name(path)}'", line)
@@ -225,15 +225,15 @@ def read_mesh(path: Path, reading: Reading, unknown: Problem, known: tuple[str, 
     extension = path.suffix.lower()
     if extension in MESHES:
         return formats.read(path, reading)
-    if (of_scenes := reading.extensions.scene_loader(extension)) is not None:
+    if (of_scenes := reading.extensions.loader("scenes", extension)) is not None:
         reading.check_file(path, "scene file")
         what = f"scene '{shown(path.name)}'"
         result = of_scenes.run("RG497", f"{what} cannot be read", path, reading)
         if not isinstance(result, Scene):
             raise _unusable(of_scenes, what, f"{type(result).__name__}, not a Scene")
         return result
-    if (loader := reading.extensions.mesh_loader(extension)) is None:
-        added: list[Added[Any]] = [*reading.extensions.scenes(), *reading.extensions.meshes()]
+    if (loader := reading.extensions.loader("meshes", extension)) is None:
+        added: list[Added[Any]] = [*reading.extensions.added("scenes"), *reading.extensions.added("meshes")]
         names = [*known, *(one.name for one in added)]
         text = f"{unknown.text} {', '.join(dict.fromkeys(names))}"
         raise InputError([Problem(unknown.code, text, unknown.place), *reading.extensions.problems])

@@ -19,7 +19,8 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rendergraph.declare import MeshData, Node, type_name
+from rendergraph.declare import MeshData, Node
+from rendergraph.declare.node import type_name
 from rendergraph.errors import InputError, Option, Place, Problem
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ import rendergraph as rg
 from rendergraph import images
 from rendergraph.api import Extension, Image, SceneKey
 from rendergraph.catalog import Catalog
-from rendergraph.declare import extension_mistakes
+from rendergraph.declare.extensions import extension_mistakes
 from rendergraph.errors import InputError
 from rendergraph.keys import file_schema
 from rendergraph.reference import file_keys, table_of
