@@ -55,13 +55,13 @@ class Catalog:
         named = {entry.path.resolve(): entry for entry in find.configured()} if installed else {}
         named |= {path.resolve(): find.PluginPath(path) for path in plugin_paths}
         listed: dict[str, list[Listed]] = {}
-        own = find.projects(path for path in named if path.is_dir())
+        folders = [path for path in named if path.is_dir()]
+        own = find.projects(folders)
         offered = list(entry_points(GROUP, find.EXTENSIONS)) if installed else []
         if own:
             offered = [entry for entry in offered if plain(entry.package.name) not in own]
-        for entry in offered:
-            if entry.group == GROUP:
-                _add(listed, find.package(entry.name, entry.module))
+        for entry in (entry for entry in offered if entry.group == GROUP):
+            _add(listed, find.package(entry.name, entry.module))
         notes = []
         for plugin in named.values():
             try:
@@ -70,7 +70,6 @@ class Catalog:
                 if not plugin.where or plugin.path.exists():
                     raise
                 notes += [problem.as_warning() for problem in error.problems]
-        folders = [(find.package_of(path), path) for path in named if path.is_dir()]
         added = find.extensions(folders, [entry for entry in offered if entry.group == find.EXTENSIONS])
         found = cls(listed, extensions=added, notes=tuple(notes))
         return found.with_classes(own_classes()) if installed else found

@@ -5,29 +5,20 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
+from rendergraph import textures
 from rendergraph.catalog.header import Header
-from rendergraph.catalog.parameter import ParameterReader, uniform_names
+from rendergraph.catalog.parameter import ParameterReader, is_parameter
 from rendergraph.declare import Extensions, Facts, Input, Node, Output, Parameter, Port, WrittenPort
 from rendergraph.document import Value
 from rendergraph.errors import Place, Problem, shown_file, suggestion
 from rendergraph.glsl import SourceText, is_shadertoy, strip_comments
 from rendergraph.glsl.globals import Global, globals_of
 from rendergraph.ports import Ruled, SizeRule
-from rendergraph.textures import (
-    FORMATS,
-    GLSL_SHAPES,
-    SEMANTICS,
-    SIGNATURES,
-    DisplayColor,
-    SceneData,
-    Semantic,
-    Signature,
-)
-from rendergraph.textures import Any as AnyTexture
+from rendergraph.textures import FORMATS, GLSL_SHAPES, SEMANTICS, SIGNATURES, Semantic, Signature
 
 _SAMPLER = re.compile(r"[iu]?sampler(2D|2DArray|3D|Cube|2DMS|2DMSArray)(Shadow)?\Z")
 _IMAGE = re.compile(r"[iu]?image(2D|2DArray|3D)\Z")
@@ -37,17 +28,13 @@ _INTEGER_FORMATS = {"uint": "r32ui", "uvec2": "rg32ui", "uvec3": "rgba32ui", "uv
 _INTEGER_FORMATS |= {"int": "r32i", "ivec2": "rg32i", "ivec3": "rgba32i", "ivec4": "rgba32i"}
 _VARYINGS = ("v_uv",)
 """Varyings of the full-screen vertex shader."""
+_CHANNEL = partial(Input, textures.Any, size="any", filter="linear", wrap="repeat")
 _SHADERTOY_PORTS: dict[str, Port] = {
-    "image": Output(DisplayColor, format="rgba8", doc="The picture, as Shadertoy shows it."),
+    "image": Output(textures.DisplayColor, format="rgba8", doc="The picture, as Shadertoy shows it."),
     "values": Output(
-        AnyTexture, format="rgba32f", doc="The same in float32 with alpha, as Shadertoy's buffers hold it."
+        textures.Any, format="rgba32f", doc="The same in float32 with alpha, as Shadertoy's buffers hold it."
     ),
-    **{
-        f"iChannel{number}": Input(
-            AnyTexture, size="any", filter="linear", wrap="repeat", doc=f"What the program reads as iChannel{number}."
-        )
-        for number in range(4)
-    },
+    **{f"iChannel{number}": _CHANNEL(doc=f"What the program reads as iChannel{number}.") for number in range(4)},
 }
 MOST_NAMES = 256
 """Limit of ports and parameters of a shader file."""
@@ -90,8 +77,7 @@ class Entries:
     def _place(self, at: int) -> tuple[Place | None, str]:
         """Return the place in the author's file of a character of the text, and its line."""
         number = self.text.count("\n", 0, at)
-        column = at - (self.text.rfind("\n", 0, at) + 1) + 1
-        return self.source.origins[number].place(column), self.source.lines[number]
+        return self.source.origins[number].place(at - self.text.rfind("\n", 0, at)), self.source.lines[number]
 
     def place_of(self, name: str) -> Place:
         """Return where a name is declared, in the text or else in the header."""
@@ -133,9 +119,8 @@ class Entries:
             self.ports[name] = _SHADERTOY_PORTS[name]
         elif found.storage == "in":
             if name not in _VARYINGS:
-                self.report(
-                    "RG441", f"nothing writes the varying '{name}'; a full-screen pass has v_uv, from 0 to 1", found
-                )
+                text = f"nothing writes the varying '{name}'; a full-screen pass has v_uv, from 0 to 1"
+                self.report("RG441", text, found)
         elif found.storage == "out" or (stored and self.file.suffix == ".comp" and "readonly" not in found.qualifiers):
             self._output(name, {})
         elif stored or _SAMPLER.match(found.type):
@@ -212,7 +197,7 @@ class Entries:
         if "kind" in entry:
             return str(entry["kind"].data)
         semantic = str(entry["semantic"].data) if "semantic" in entry else ""
-        if semantic == SceneData.name:
+        if semantic == textures.SceneData.name:
             return "scene"
         if semantic in [signature.texture for signature in SIGNATURES]:
             return "texture2d_array"  # read by the function of that signature
@@ -239,7 +224,7 @@ class Entries:
             self.problems += self.extensions.problems
         where = value if value is not None else next(iter(entry.values()))
         self.problems.append(where.problem("RG440", text))
-        return AnyTexture
+        return textures.Any
 
     def _output(self, name: str, entry: Mapping[str, Value]) -> None:
         original = {new: old for old, new in self._renamed.items()}.get(name, name)
@@ -255,13 +240,9 @@ class Entries:
             return
         if "like" not in entry or "semantic" in entry:
             options["semantic"] = self._semantic(entry, "texture2d")
-        options |= {key: number_rule(entry[key]) for key in ("layers", "samples", "bytes", "mips") if key in entry}
-        if "format" in entry:
-            options["format"] = _word_rule(entry["format"])
-        if "size" in entry:
-            options["size"] = _size_rule(entry["size"])
-        if "clear" in entry:
-            options["clear"] = _texel(entry["clear"])
+        rules = dict.fromkeys(("layers", "samples", "bytes", "mips"), number_rule)
+        rules |= {"format": _word_rule, "size": _size_rule, "clear": _texel}
+        options |= {key: rule(entry[key]) for key, rule in rules.items() if key in entry}
         if options.get("kind") == "buffer" and "bytes" not in options:
             text = f"the buffer '{name}' has no size; add outputs: {{{name}: {{bytes: N}}}} to the header"
             self.report("RG441", text, found)
@@ -296,7 +277,7 @@ class Entries:
 
     def _fits_format(self, found: Global, entry: Mapping[str, Value]) -> bool:
         """Return whether the header's format holds values of the declared type; report a mistake if not."""
-        texel = FORMATS.get(str(entry["format"].data)) if "format" in entry else None
+        texel = _format(entry)
         if texel is None:
             return True
         prefix = {"uint": "u", "int": "i"}.get(texel.family, "")
@@ -321,7 +302,7 @@ class Entries:
 
         named = self.header.names.get(name)
         reader = ParameterReader(name, entry, named, declared, report)
-        uniforms = [other for other in uniform_names(self.globals.declared) if other not in self.header.names]
+        uniforms = [g.name for g in self.globals.declared if is_parameter(g) and g.name not in self.header.names]
         parameter = reader.parameter(uniforms, lambda: self._words)
         if parameter is not None:
             self.parameters[name] = parameter
@@ -334,8 +315,8 @@ class Entries:
 
     def _check_references(self) -> None:
         """Check that `like`, `size` and `$name` name inputs and structural parameters."""
-        inputs = dict.fromkeys([name for name, port in self.ports.items() if isinstance(port, Input)])
-        inputs |= dict.fromkeys(self.header.inputs)  # a wrong one has been reported
+        inputs = {name for name, port in self.ports.items() if isinstance(port, Input)}
+        inputs |= self.header.inputs.keys()  # a wrong one has been reported
         params = self.header.params.items()
         structural = [name for name, entry in params if "role" in entry and entry["role"].data == "structural"]
         values = [value for entry in self.header.outputs.values() for value in entry.values()]
@@ -346,15 +327,12 @@ class Entries:
                 if isinstance(word, str) and re.match(r"\$\w+\Z", word) and word[1:] not in structural:
                     text = f"there is no parameter '{word[1:]}' with role: structural{suggestion(word[1:], structural)}"
                     self.problems.append(part.problem("RG444", text))
-        for entry in self.header.outputs.values():
-            for key in ("like", "size"):
-                given = entry.get(key)
-                first = given.data[0] if given is not None and isinstance(given.data, list) else given
-                if first is None or not isinstance(first.data, str) or first.data.startswith("$"):
-                    continue
-                if first.data not in inputs:
-                    text = f"'{key}' names no input of this node: '{first.data}'{suggestion(first.data, inputs)}"
-                    self.problems.append(first.problem("RG444", text))
+        for key, given in (pair for entry in self.header.outputs.values() for pair in entry.items()):
+            first = given.data[0] if isinstance(given.data, list) else given
+            is_name = key in ("like", "size") and isinstance(first.data, str) and not first.data.startswith("$")
+            if is_name and first.data not in inputs:
+                text = f"'{key}' names no input of this node: '{first.data}'{suggestion(first.data, inputs)}"
+                self.problems.append(first.problem("RG444", text))
 
     def warnings(self, cls: type[Node]) -> Iterator[Problem]:
         """Yield one warning about everything that the class lacks, and warnings about likely mistakes."""
@@ -373,8 +351,12 @@ class Entries:
             yield Problem("RG446", text, *self._place(match.start()), severity="warning")
 
 
+def _format(entry: Mapping[str, Value]) -> textures.Format | None:
+    return FORMATS.get(str(entry["format"].data)) if "format" in entry else None
+
+
 def _is_depth(entry: Mapping[str, Value]) -> bool:
-    texel = FORMATS.get(str(entry["format"].data)) if "format" in entry else None
+    texel = _format(entry)
     return texel is not None and texel.is_depth
 
 

@@ -12,7 +12,7 @@ import os
 import re
 import sys
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -67,16 +67,12 @@ def configured() -> Iterator[PluginPath]:
     if project is not None:
         for path in project.plugins:
             yield PluginPath(path, Place(shown_file(project.file)))
-    for text in os.environ.get(VARIABLE, "").split(os.pathsep):
-        if text.strip():
-            yield PluginPath(expand_home(text.strip()), where=f", which {VARIABLE} names")
+    for text in filter(None, map(str.strip, os.environ.get(VARIABLE, "").split(os.pathsep))):
+        yield PluginPath(expand_home(text), where=f", which {VARIABLE} names")
 
 
 def projects(folders: Iterable[Path]) -> frozenset[str]:
-    """Return the normalized names of the distributions whose project folders these are.
-
-    A project's folder replaces an installed copy, which may be older.
-    """
+    """Return the normalized names of the distributions whose projects these are, which replace installed copies."""
     return frozenset({_project(folder) for folder in folders} - {"", OWN})
 
 
@@ -113,10 +109,7 @@ def package(plugin: str, package: str) -> Iterator[tuple[str, Listed]]:
 
 
 def _modules(folder: Path, package: str, plugin: str, shaders: Path | None) -> list[tuple[str, Listed]]:
-    return list(_listed(folder, package, plugin, shaders))
-
-
-def _listed(folder: Path, package: str, plugin: str, shaders: Path | None) -> Iterator[tuple[str, Listed]]:
+    found: list[tuple[str, Listed]] = []
     files = list(_files(folder))
     has_python = any(suffix == ".py" for _, _, _, suffix in files)
     for where, family, stem, suffix in files:
@@ -124,13 +117,14 @@ def _listed(folder: Path, package: str, plugin: str, shaders: Path | None) -> It
         if suffix == ".py":
             module = ".".join([package, *filter(None, family.split("/")), stem])
             beside = Path(where) if shaders is None else shaders / family
-            yield stem, Listed(module, family, Path(file), beside, plugin)
+            found.append((stem, Listed(module, family, Path(file), beside, plugin)))
         elif not has_python or _has_header(file):
-            yield stem, Listed("", family, Path(file), Path(where), plugin)
+            found.append((stem, Listed("", family, Path(file), Path(where), plugin)))
     for where, family, stem, suffix in _files(shaders) if shaders is not None else ():
         file = os.path.join(where, stem + suffix)
         if suffix in SHADERS and _has_header(file):
-            yield stem, Listed("", family, Path(file), Path(where), plugin)
+            found.append((stem, Listed("", family, Path(file), Path(where), plugin)))
+    return found
 
 
 def _files(folder: Path, most: float = math.inf) -> Iterator[tuple[str, str, str, str]]:
@@ -179,9 +173,8 @@ def shader(file: Path) -> Listed:
     return Listed("", "", file, file.parent, file.parent.name)
 
 
-def package_of(path: Path) -> str:
-    """Return the name of the package that stands for the folder of a plugin given by path."""
-    folder = path.resolve() if path.is_dir() else path.resolve().parent
+def package_of(folder: Path) -> str:
+    """Return the name of the package that stands for the resolved folder of a plugin given by path."""
     return f"{PREFIX}{zlib.crc32(os.fsencode(folder)):08x}"
 
 
@@ -199,7 +192,7 @@ def loose(named: PluginPath) -> Iterator[tuple[str, Listed]]:
     if not path.is_dir() and (path.suffix != ".py" or "." in path.stem or not path.is_file()):
         kinds = f"a folder, a Python module (a name without dots, then .py) or a shader file ({', '.join(SHADERS)})"
         raise InputError(Problem("RG011", f"there is no plugin in '{path}'{where}; use {kinds}", named.place))
-    package = package_of(path)
+    package = package_of(folder)
     fresh_package(package, folder)
     plugin = folder.name if path.is_dir() else path.stem
     nodes, shaders = folder / "nodes", folder / "shaders"
@@ -211,20 +204,20 @@ def loose(named: PluginPath) -> Iterator[tuple[str, Listed]]:
         yield path.stem, Listed(f"{package}.{path.stem}", "", path, folder, plugin)
 
 
-def extensions(folders: Iterable[tuple[str, Path]], offered: Iterable[EntryPoint]) -> Extensions:
+def extensions(folders: Sequence[Path], offered: Iterable[EntryPoint]) -> Extensions:
     """Return what plugins add; nothing is imported before it is requested."""
-    named, entries = tuple(folders), sorted(offered, key=lambda entry: entry.value)
-    return Extensions(lambda: _sources(named, entries))
+    entries = sorted(offered, key=lambda entry: entry.value)
+    return Extensions(lambda: _sources(folders, entries))
 
 
-def _sources(folders: Iterable[tuple[str, Path]], offered: Iterable[EntryPoint]) -> Iterator[Source]:
+def _sources(folders: Iterable[Path], offered: Iterable[EntryPoint]) -> Iterator[Source]:
     for entry in offered:
         yield _source(entry.package.name, _file(entry), entry.load, entry.value)
-    for package, folder in folders:
+    for folder in folders:
         file = folder / f"{MODULE}.py"
         record_read(file)
         if file.is_file():
-            yield _source(folder.name, file, _loader(f"{package}.{MODULE}"), f"{MODULE}.py:{NAME}")
+            yield _source(folder.name, file, _loader(f"{package_of(folder)}.{MODULE}"), f"{MODULE}.py:{NAME}")
 
 
 def _loader(module: str) -> Callable[[], Any]:

@@ -26,12 +26,7 @@ _NAME = re.compile(r"[A-Za-z]\w*\Z", re.ASCII)
 
 
 class Header(Struct, frozen=True, eq=False):
-    """A header as it is written, without its wrong entries.
-
-    Attributes:
-        inputs, outputs, params: the keys of each entry by its name.
-        names: the entries themselves, for their places.
-    """
+    """A header as it is written, without its wrong entries: the keys of each by its name; `names` has their places."""
 
     doc: str | None = None
     inputs: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
@@ -177,9 +172,8 @@ def _checked(document: Document) -> Header:
     for section, entries in sections.items():
         for name, entry in given[section].items() if section in given else ():
             if name in names:
-                text = (
-                    f"'{name}' is also in line {names[name].key_place.line}; ports and parameters need distinct names"
-                )
+                line = names[name].key_place.line
+                text = f"'{name}' is also in line {line}; ports and parameters need distinct names"
                 validator.report(entry, _CODES.name, text, key=True)
                 continue
             names[name] = entry

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from typing import Any, Literal
 
 from msgspec import Struct
@@ -19,10 +19,9 @@ _VECTOR = re.compile(r"([iu]?)vec([234])\Z")
 Report = Callable[[str, str, "Value | None"], None]
 
 
-def uniform_names(declared: Iterable[Global]) -> list[str]:
-    return [
-        one.name for one in declared if one.storage == "uniform" and (one.type in _SCALAR or _VECTOR.match(one.type))
-    ]
+def is_parameter(found: Global) -> bool:
+    """Whether a declaration may be a parameter: a number, a switch or a vector."""
+    return found.storage == "uniform" and (found.type in _SCALAR or _VECTOR.match(found.type) is not None)
 
 
 class ParameterReader(Struct, eq=False):
@@ -46,7 +45,7 @@ class ParameterReader(Struct, eq=False):
             if self.named is not None:
                 self.report("RG444", mismatch, self.named)
             return None
-        if found is not None and (found.array or not (found.type in _SCALAR or _VECTOR.match(found.type))):
+        if found is not None and (found.array or not is_parameter(found)):
             what = f"an array of {found.type}" if found.array else found.type
             kinds = "bool, int, uint, float and their vectors can be"
             self.report("RG441", f"'{self.name}' is {what}, which is not a parameter; {kinds}", None)
@@ -131,11 +130,9 @@ class ParameterReader(Struct, eq=False):
             return Literal[choices], choices[0] if default is None else default
         if isinstance(default, bool | int | float):
             return type(default), default
-        text = (
-            f"'{self.name}' is not a uniform of the shader; it needs choices, or a default that is a number or a switch"
-        )
         if self.named is not None:
-            self.report("RG444", text, self.named)
+            needs = "it needs choices, or a default that is a number or a switch"
+            self.report("RG444", f"'{self.name}' is not a uniform of the shader; {needs}", self.named)
         return None
 
     def _check_range(self, limits: Range, default: Any) -> None:

@@ -23,6 +23,8 @@ def source_location(error: BaseException, *own: Path | str) -> Place | None:
     A syntax error is located at its own line. Helpers beside a node count as the author's; the framework, NumPy and
     the like do not. `own` lists the author's files, folders, and modules, which stand for their whole packages.
     """
+    from traceback import walk_tb  # only for mistakes
+
     folders = [path for path in own if isinstance(path, Path)]
     packages = {module.partition(".")[0] for module in own if isinstance(module, str)}
 
@@ -37,13 +39,9 @@ def source_location(error: BaseException, *own: Path | str) -> Place | None:
             file = Path(cause.filename)
             if any(file.is_relative_to(folder) for folder in folders):
                 return Place(shown_file(file), cause.lineno or 1, 1)
-        trace, found = cause.__traceback__, None
-        while trace is not None:
-            if is_own(trace.tb_frame):
-                found = Place(shown_file(trace.tb_frame.f_code.co_filename), trace.tb_lineno, 1)
-            trace = trace.tb_next
-        if found is not None:
-            return found
+        if found := [(frame, line) for frame, line in walk_tb(cause.__traceback__) if is_own(frame)]:
+            frame, line = found[-1]
+            return Place(shown_file(frame.f_code.co_filename), line, 1)
     return None
 
 
@@ -52,15 +50,15 @@ def declaration_of(cls: type[Node], file: Path, name: str = "") -> Place:
 
     `file` is its module, or the shader that defines it; an empty name means the node itself.
     """
-    if file.suffix == ".py":
-        own = [base for base in cls.__mro__ if issubclass(base, Node) and base is not Node]
-        for base in (base for base in own if name in {**vars(base), **get_annotations(base)}):
-            module = getattr(sys.modules.get(base.__module__), "__file__", None)
-            found = declaration_in(Path(module) if module else file, name)
-            if found.line:
-                return found
-        return declaration_in(file, cls.__name__)
-    return declaration_in(file, name)
+    if file.suffix != ".py":
+        return declaration_in(file, name)
+    own = [base for base in cls.__mro__ if issubclass(base, Node) and base is not Node]
+    for base in (base for base in own if name in {**vars(base), **get_annotations(base)}):
+        module = getattr(sys.modules.get(base.__module__), "__file__", None)
+        found = declaration_in(Path(module) if module else file, name)
+        if found.line:
+            return found
+    return declaration_in(file, cls.__name__)
 
 
 def declaration_in(file: Path, name: str) -> Place:

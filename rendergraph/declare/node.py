@@ -22,12 +22,7 @@ _is_number = test_of(float)
 
 
 class FileContent(Struct, frozen=True):
-    """The file that a parameter names, relative to the file that contains the value.
-
-    Attributes:
-        path: of the file, which exists.
-        digest: of its content, so that a changed file is another value.
-    """
+    """The existing file that a parameter names, with a digest of its content: a changed file is another value."""
 
     path: Path
     digest: str
@@ -68,7 +63,7 @@ class Parameter(Struct, frozen=True, dict=True):
     @cached_property
     def choices(self) -> tuple[Any, ...]:
         """The values that its type lists, also as part of a union."""
-        return tuple(_listed(self.type))
+        return _listed(self.type)
 
     @cached_property
     def words(self) -> tuple[str, ...]:
@@ -101,22 +96,16 @@ class Parameter(Struct, frozen=True, dict=True):
     def violation(self, value: object) -> str | None:
         """Return what a value outside the limits must be; None for other values."""
         parts: tuple[Any, ...] = value if isinstance(value, tuple) else (value,)
-        for number in parts:
-            if _is_number(number) and (wrong := self.limits.violation(number)):
-                return wrong
-        return None
+        return next(filter(None, (self.limits.violation(number) for number in parts if _is_number(number))), None)
 
     @cached_property
     def _taken(self) -> tuple[Callable[[Any], Any], Callable[[Any], bool]]:
         return conversion_to(self.type), test_of(self.type)
 
 
-def _listed(annotation: Any) -> Iterator[Any]:
-    if get_origin(annotation) is Literal:
-        yield from get_args(annotation)
-    else:
-        for part in get_args(annotation):
-            yield from _listed(part)
+def _listed(annotation: Any) -> tuple[Any, ...]:
+    parts = get_args(annotation)
+    return parts if get_origin(annotation) is Literal else tuple(value for part in parts for value in _listed(part))
 
 
 def param(
@@ -269,8 +258,8 @@ class Node:
             for name, value in vars(base).items():
                 if isinstance(value, Port):
                     found[name] = value
-                elif name in found:
-                    del found[name]  # a subclass drops a port by setting it to DROPPED, which is None
+                else:
+                    found.pop(name, None)  # a subclass drops a port by setting it to DROPPED, which is None
         return found
 
     @classmethod

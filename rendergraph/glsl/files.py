@@ -6,7 +6,7 @@ import itertools
 import os
 import re
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 from msgspec import Struct
@@ -38,11 +38,7 @@ def strip_comments(text: str) -> str:
 
 
 class Directive(Struct, frozen=True, gc=False):
-    """A line that rendergraph handles itself.
-
-    Attributes:
-        word: `include`, `version`, `line`, or `needs` for a `#pragma needs`, which the driver ignores.
-    """
+    """A line that rendergraph handles itself; its `word` is `include`, `version`, `line` or `needs`, of a pragma."""
 
     number: int
     text: str
@@ -64,11 +60,7 @@ class Directive(Struct, frozen=True, gc=False):
 
 
 class LineRun(Struct, frozen=True, gc=False):
-    """Consecutive lines for the driver, and the directive after them.
-
-    Attributes:
-        nests: how many more `#if` they open than they close.
-    """
+    """Consecutive lines for the driver, with `nests` more `#if` than `#endif`, and the directive after them."""
 
     first: int
     lines: tuple[str, ...]
@@ -81,38 +73,24 @@ class Links:
     """Resolves symbolic links; caches folders, because every include needs them."""
 
     def __init__(self) -> None:
-        self._followed: dict[str, str] = {}
-        self._targets: dict[Path, str] = {}
-        self._files: dict[tuple[Path, str, Path], Path | None] = {}
+        self.follow, self.of, self.file = cache(self._follow), cache(self._of), cache(self._file)
 
-    def follow(self, path: str) -> str:
+    def _follow(self, path: str) -> str:
         """Return `os.path.realpath`."""
-        found = self._followed.get(path)
-        if found is None:
-            folder, name = os.path.split(path)
-            if folder in ("", path) or name in ("", ".", ".."):
-                found = os.path.realpath(path)
-            else:
-                found = os.path.join(self.follow(folder), name)
-                found = os.path.realpath(found) if os.path.islink(found) else found
-            self._followed[path] = found
-        return found
+        folder, name = os.path.split(path)
+        if folder in ("", path) or name in ("", ".", ".."):
+            return os.path.realpath(path)
+        found = os.path.join(self.follow(folder), name)
+        return os.path.realpath(found) if os.path.islink(found) else found
 
-    def of(self, path: Path) -> str:
+    def _of(self, path: Path) -> str:
         """Return the same for a path that may be relative to the current folder."""
-        found = self._targets.get(path)
-        if found is None:
-            found = self._targets[path] = self.follow(str(path if path.is_absolute() else Path.cwd() / path))
-        return found
+        return self.follow(str(path if path.is_absolute() else Path.cwd() / path))
 
-    def file(self, folder: Path, name: str, home: Path) -> Path | None:
+    def _file(self, folder: Path, name: str, home: Path) -> Path | None:
         """Return the path of a name in a folder, whether it exists or not; None if it lies outside of `home`."""
-        key = folder, name, home
-        if key not in self._files:
-            target = folder / name
-            inside = os.path.join(self.of(home), "")
-            self._files[key] = target if os.path.join(self.of(target), "").startswith(inside) else None
-        return self._files[key]
+        target, inside = folder / name, os.path.join(self.of(home), "")
+        return target if os.path.join(self.of(target), "").startswith(inside) else None
 
 
 def read_text(file: Path) -> str:
