@@ -335,9 +335,8 @@ def mistakes_in(what: str, value: object, annotation: Any, subject: str = "") ->
     if table is not None and isinstance(value, Mapping):
         for key, entry in value.items():
             if not fits(key, table[0]):
-                yield Problem(
-                    "RG490", f"{what} has the key {key!r}, which is not {words_for(table[0])}", subject=subject
-                )
+                text = f"{what} has the key {key!r}, which is not {words_for(table[0])}"
+                yield Problem("RG490", text, subject=subject)
             yield from mistakes_in(f"{what}[{key!r}]", entry, table[1], subject)
         return
     if get_origin(annotation) is tuple and Ellipsis in get_args(annotation) and isinstance(value, tuple):
@@ -372,12 +371,6 @@ def _fields(kind: type[Struct]) -> tuple[tuple[str, Any, Any, Callable[[Any], bo
     defaults = (*(len(names) - len(defaults)) * [msgspec.NODEFAULT], *defaults)
     types = [hints[name] for name in names]
     return tuple(zip(names, defaults, types, map(test_of, types), strict=True))
-
-
-@cache
-def _annotations_of(kind: type) -> dict[str, Any]:
-    """Return the annotations of one class, which `typing` would resolve again for each class that inherits them."""
-    return get_annotations(kind, eval_str=True)
 
 
 def validated(thing: T, who: str = "") -> T:
@@ -424,5 +417,6 @@ def accepts(annotation: Any, kind: type) -> bool:
     return kind in (annotation, get_origin(annotation)) or any(accepts(part, kind) for part in get_args(annotation))
 
 
+_annotations_of = cache(partial(get_annotations, eval_str=True))  # `typing` resolves a base's again for each subclass
 hints_of: Callable[[Any], dict[str, Any]] = cache(partial(get_type_hints, include_extras=True))
 """Returns the annotations of a class or function by name; cached."""

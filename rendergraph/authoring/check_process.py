@@ -91,12 +91,8 @@ class _Check:
         self._file, self._limits = arguments["file"], limits
         self._trace = Path(folder) / "trace"
         self._trace.touch()
-        self._child = ChildProcess(
-            "rendergraph.authoring.check_process:main",
-            arguments | {"trace": str(self._trace)},
-            {"TMPDIR": folder},
-            subprocess.PIPE,
-        )
+        arguments |= {"trace": str(self._trace)}
+        self._child = ChildProcess(f"{__name__}:main", arguments, {"TMPDIR": folder}, subprocess.PIPE)
         self._process, self._stdout = self._child.process, self._child.process.stdout
         assert self._stdout is not None
         self._output = b""

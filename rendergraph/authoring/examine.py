@@ -20,7 +20,7 @@ from rendergraph.authoring.harness import NodeVariant, variants
 from rendergraph.authoring.node_check import SCENE, NodeCheck
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.catalog.types import shared_includes
-from rendergraph.declare import Function, Input, Node, Views, WrittenPort
+from rendergraph.declare import Input, Node
 from rendergraph.declare.blame import declaration_of
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.glsl import Includes, read_text, strip_comments
@@ -107,12 +107,9 @@ def doc_problems(cls: type[Node]) -> Iterator[Problem]:
         yield Problem("RG490", "has no docs")
     elif not first.endswith("."):
         yield Problem("RG490", "the first line of its docs must be a sentence that ends in '.'")
-    docs = {
-        name: port.doc
-        for name, port in cls.ports().items()
-        if isinstance(port, Input | WrittenPort | Function | Views)
-        and (port.doc or name in {*cls.inputs(), *cls.outputs()})
-    }
+    public = cls.inputs().keys() | cls.outputs().keys()
+    docs = {name: getattr(port, "doc", "") for name, port in cls.ports().items()}
+    docs = {name: doc for name, doc in docs.items() if doc or name in public}
     docs |= {name: parameter.doc for name, parameter in cls.parameters().items()}
     for name, doc in docs.items():
         if not doc:
@@ -131,7 +128,7 @@ def _unused(node: NodeType, active: Collection[str], files: Iterable[Path]) -> I
     cls = node.cls
     for name, parameter in cls.parameters().items():
         symbol = name.upper() if parameter.role == "define" else name
-        in_shader = name in active if parameter.role == "param" else bool(re.search(rf"\b{symbol}(_\w+)?\b", shaders))
+        in_shader = name in active if parameter.role == "param" else re.search(rf"\b{symbol}(_\w+)?\b", shaders)
         if not in_shader and not re.search(rf"\.{name}\b", text):
             yield name
     for name, port in cls.inputs().items():

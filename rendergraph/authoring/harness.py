@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import re
-import types
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from typing import Any
 
 from rendergraph import api
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.declare import InOut, Input, Node
+from rendergraph.declare import Input, Node
 from rendergraph.ports import Samples
 from rendergraph.textures import FORMATS, TEXTURE_KINDS, TextureDesc
 
@@ -70,17 +69,12 @@ def _all(cls: type[Node]) -> Iterator[NodeVariant]:
     everything = _usable(cls, frozenset())
     yield NodeVariant("", outputs=everything)
     for name, value, is_end in _values(cls):
-        text = f"{name}={value}"
-        yield NodeVariant(
-            text.lower() if isinstance(value, bool) else text, {name: value}, outputs=everything, is_range_end=is_end
-        )
-    optional = [name for name, port in cls.inputs().items() if isinstance(port, Input | InOut) and port.optional]
-    for name in optional:
-        yield NodeVariant(f"without {name}", unconnected=frozenset({name}), outputs=_usable(cls, frozenset({name})))
-    if len(optional) > 1:
-        yield NodeVariant(
-            "without optional inputs", unconnected=frozenset(optional), outputs=_usable(cls, frozenset(optional))
-        )
+        text = f"{name}={value}".lower() if isinstance(value, bool) else f"{name}={value}"
+        yield NodeVariant(text, {name: value}, outputs=everything, is_range_end=is_end)
+    optional = [name for name, port in cls.inputs().items() if port.optional]
+    absent = {name: {name} for name in optional} | ({"optional inputs": {*optional}} if len(optional) > 1 else {})
+    for text, names in absent.items():
+        yield NodeVariant(f"without {text}", outputs=everything).without(cls, names)
     if any(isinstance(port, Input) and port.samples == "any" for port in cls.inputs().values()):
         yield NodeVariant("several samples", outputs=everything, multisampled=True)
     if len(everything) > 1:
@@ -129,8 +123,7 @@ class HarnessGraph:
             if samples == "any" and port.kind in TEXTURE_KINDS:
                 self.multisampled[name] = self._type("feed_samples", name, _source(name, port, self.folder, 4))
         for name, output in self.checked.cls.outputs().items():
-            reader = _reader(name, output, self.folder)
-            if reader is not None:
+            if reader := _reader(name, output, self.folder):
                 self.readers[name] = self._type("use", name, reader)
 
     @property
@@ -146,8 +139,8 @@ class HarnessGraph:
         harness = (*self.sources.values(), *self.multisampled.values(), *self.readers.values())
         return Catalog({}, {entry.name: entry for entry in (self.checked, *harness)})
 
-    def _pipeline(self, variant: NodeVariant, scene: str) -> dict[str, Any]:
-        """Return the pipeline of a variant; its outputs are the sources', then the node's, if the variant has any."""
+    def write(self, variant: NodeVariant, scene: str) -> Path:
+        """Write the pipeline of a variant; its outputs are the sources', then the node's, if the variant has any."""
         cls, node = self.checked.cls, self.checked.name
         nodes: dict[str, Any] = {}
         inputs: dict[str, Any] = {}
@@ -172,16 +165,14 @@ class HarnessGraph:
             else:
                 nodes[reader.name] = {"type": reader.name, "inputs": {"read": f"{node}.{name}"}}
                 outputs[name] = f"{reader.name}.made"
-        return {"rendergraph": 1, "size": list(SIZE), "scene": scene, "nodes": nodes, "outputs": outputs}
+        pipeline = {"rendergraph": 1, "size": list(SIZE), "scene": scene, "nodes": nodes, "outputs": outputs}
+        file = self.folder / "check.yaml"
+        file.write_text(json.dumps(pipeline), encoding="utf-8")
+        return file
 
     def input_of(self, output: str) -> str:
         """Return the input whose source an output of the pipeline shows; empty for an output of the node."""
         return output.removeprefix(_FROM) if output.startswith(_FROM) else ""
-
-    def write(self, variant: NodeVariant, scene: str) -> Path:
-        file = self.folder / "check.yaml"
-        file.write_text(json.dumps(self._pipeline(variant, scene)), encoding="utf-8")
-        return file
 
 
 # --- sources ---------------------------------------------------------------------------------------------------------
@@ -295,11 +286,9 @@ def _reader(name: str, port: api.Port, folder: Path) -> type[api.Node] | None:
         (folder / "use_samples.frag").write_text(text, encoding="utf-8")
         return _node("OneSample", read=read, made=value, record=_first_sample)
     if getattr(port, "kind", "") == "buffer":
-        (folder / "use_buffer.frag").write_text(
-            "layout(std430) readonly buffer read { uint words[]; };\nout vec4 made;\n"
-            "void main() { made = vec4(words[uint(gl_FragCoord.x) % uint(words.length())]); }\n",
-            encoding="utf-8",
-        )
+        text = "layout(std430) readonly buffer read { uint words[]; };\nout vec4 made;\n"
+        text += "void main() { made = vec4(words[uint(gl_FragCoord.x) % uint(words.length())]); }\n"
+        (folder / "use_buffer.frag").write_text(text, encoding="utf-8")
         semantic = getattr(port, "semantic", None) or api.Any
         read = api.Input(semantic, kind="buffer", doc="The texture.")
         return _node("Words", read=read, made=value, shader="use_buffer.frag")
@@ -335,4 +324,4 @@ def _added(signature: api.Signature) -> str:
 
 def _node(name: str, *, shader: str | None = None, **attributes: Any) -> type[api.Node]:
     body = {"__module__": __name__, "__doc__": "Part of a check.", "shader": shader, **attributes}
-    return types.new_class(name, (api.Node,), exec_body=lambda space: space.update(body))
+    return type(name, (api.Node,), body)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import types
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +23,7 @@ from rendergraph.gl.device import Device, open_device
 from rendergraph.gl.programs import outputs_of
 from rendergraph.gl.saved_state import SavedState
 from rendergraph.program import prefix
+from rendergraph.program.text import VERSION
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.session import RenderOptions, Selection, stages
 from rendergraph.session.drawing import Drawing
@@ -62,7 +63,7 @@ class NodeCheck:
         self._avoided: set[str] = set()  # optional inputs of a base class with which the node fails
         self.device: Device = open_device()
         flush_deleted_programs(self.device)
-        self._before = count_objects(self.device, _MOST_NAMES)
+        self._before = _count_objects(self.device)
         self.gpu = Gpu(ctx=self.device.ctx)
         cls = guard_state(node.cls, self.gpu.device, self._report_state)
         self.harness = HarnessGraph(structs.replace(node, cls=cls), folder)
@@ -134,19 +135,13 @@ class NodeCheck:
         """Free everything, and return all problems, with their variants unless all have it."""
         self.gpu.close()
         flush_deleted_programs(self.device)
-        left = {
-            kind: count - self._before[kind]
-            for kind, count in count_objects(self.device, _MOST_NAMES).items()
-            if count > self._before[kind]
-        }
+        left = _count_objects(self.device) - self._before
         self.device.release()
         self._variant = NodeVariant("")
         if left and not self._has_errors():
             every = ", ".join(f"{count} {kind.lower()}{'s' if count > 1 else ''}" for kind, count in left.items())
-            self._report(
-                Problem("RG456", f"the node leaves GL objects behind: {every}", Place(shown_file(self.type.file))),
-                always=True,
-            )
+            place = Place(shown_file(self.type.file))
+            self._report(Problem("RG456", f"the node leaves GL objects behind: {every}", place), always=True)
         if self.tried and not self._has_errors():
             for name in self.type.cls.outputs().keys() - self._written:
                 text = f"output '{name}' is written in no variant; write it in `record`, or remove it"
@@ -193,7 +188,7 @@ class NodeCheck:
         return stages.expand(stages.link(self._resolved(variant)), RenderOptions(alias=False, reuse=False))
 
     def _note_files(self, step: Step) -> None:
-        names = [name for _, name in step.shaders] if step.node == self.type.name else []
+        names = [name for _, name in step.shaders if step.node == self.type.name]
         names += [function.shader for function in step.functions if function.node == self.type.name]
         self.files |= {self.type.shader_file(name)[0] for name in names}
         self.files |= {file for _, file in step.includes}
@@ -248,11 +243,9 @@ class NodeCheck:
         """Record what a program uses; compiling refuses what it uses without a declaration."""
         program = draw.program
         self.active |= {name.removeprefix(prefix(self.type.name)) for name in (*program.uniforms, *program.storage)}
-        names = [read.name for read in step.reads] + [write.name for write in step.writes]
-        self.active |= {
-            name for name in names if name in program.storage or f"{name}_view_block" in program.block_names
-        }
-
+        for name in (*(read.name for read in step.reads), *(write.name for write in step.writes)):
+            if name in program.storage or f"{name}_view_block" in program.block_names:
+                self.active.add(name)
         colors = [write.name for write in step.writes if write.use == "color"]
         if step.node == self.type.name and colors and not outputs_of(program):
             place = declaration_in(self.type.shader_file(dict(step.shaders)["fragment"])[0], colors[0])
@@ -260,24 +253,24 @@ class NodeCheck:
 
     def _compare(self, one: Mapping[str, npt.NDArray[Any]], other: Mapping[str, npt.NDArray[Any]]) -> None:
         for name in one:
-            port = self.harness.input_of(name)
-            if port:
+            if port := self.harness.input_of(name):
                 if not np.array_equal(self._fed[name], one[name]):
                     text = f"the node changes its input '{port}'; inputs are read-only, use an InOut port to write"
                     self._report(Problem("RG457", text, self._declaration(port)))
                 continue
+            is_float = one[name].dtype.kind == "f"
             differ = one[name] != other[name]
-            if one[name].dtype.kind == "f":
+            if is_float:
                 differ &= ~(np.isnan(one[name]) & np.isnan(other[name]))
-            count = int(_texels(differ, one[name]).sum())
-            total = _texels(differ, one[name]).size
+            unwritten = _texels(differ, one[name])
+            count, total = int(unwritten.sum()), unwritten.size
             if count and not any(problem.code == "RG454" for problem in self._problems):
                 what, fix = "texels of '{}' are not written", "`clear=`"
                 if one[name].ndim == 1:
                     what, fix = "bytes of '{}' are not written, or are added to without being cleared", "`clear=0`"
                 text = f"{count} of {total} {what.format(name)}; write them all, or declare {fix}"
                 self._report(Problem("RG454", text, self._declaration(name)))
-            elif not count and one[name].dtype.kind == "f" and not np.isfinite(one[name]).all():
+            elif not count and is_float and not np.isfinite(one[name]).all():
                 bad = int(_texels(~np.isfinite(one[name]), one[name]).sum())
                 text = f"{bad} of {total} texels of '{name}' are not finite (NaN or infinite)"
                 self._report(Problem("RG458", text, self._declaration(name), severity="warning"))
@@ -329,9 +322,8 @@ _STATE = {  # descriptions of the fields of `SavedState`
 }
 
 
-def count_objects(device: Device, most: int) -> dict[str, int]:
-    raw = device.raw
-    return {kind: sum(bool(getattr(raw, f"glIs{kind}")(name)) for name in range(1, most)) for kind in KINDS}
+def _count_objects(device: Device) -> Counter[str]:
+    return Counter(kind for kind in KINDS for name in range(1, _MOST_NAMES) if getattr(device.raw, f"glIs{kind}")(name))
 
 
 def flush_deleted_programs(device: Device) -> None:
@@ -339,32 +331,24 @@ def flush_deleted_programs(device: Device) -> None:
 
     Mesa then keeps programs of this function, so call it before and after the code under test.
     """
-    drawing = device.ctx.program(
-        vertex_shader="#version 450 core\nvoid main() { gl_Position = vec4(0.0); }",
-        fragment_shader="#version 450 core\nvoid main() {}",
-    )
-    shaping = device.ctx.program(
-        vertex_shader="#version 450 core\nvoid main() { gl_Position = vec4(0.0); }",
-        geometry_shader="#version 450 core\nlayout(points) in;\nlayout(points, max_vertices = 1) out;\nvoid main() {}",
-        fragment_shader="#version 450 core\nvoid main() {}",
-    )
-    computing = device.ctx.compute_shader("#version 450 core\nlayout(local_size_x = 1) in;\nvoid main() {}")
+    vertex, fragment = f"{VERSION}\nvoid main() {{ gl_Position = vec4(0.0); }}", f"{VERSION}\nvoid main() {{}}"
+    geometry = f"{VERSION}\nlayout(points) in;\nlayout(points, max_vertices = 1) out;\nvoid main() {{}}"
+    drawing = device.ctx.program(vertex_shader=vertex, fragment_shader=fragment)
+    shaping = device.ctx.program(vertex_shader=vertex, geometry_shader=geometry, fragment_shader=fragment)
+    computing = device.ctx.compute_shader(f"{VERSION}\nlayout(local_size_x = 1) in;\nvoid main() {{}}")
     for name in (shaping.glo, drawing.glo, computing.glo, drawing.glo, 0):
         device.raw.glUseProgram(name)
-    shaping.release()
-    drawing.release()
-    computing.release()
+    for program in (shaping, drawing, computing):
+        program.release()
     device.ctx.gc()
 
 
 def guard_state(cls: type[Node], device: Device, report: Callable[[str, str], None]) -> type[Node]:
     """Return the class with a `record` and `update` that report each change of the GL state."""
     names = [name for name in ("record", "update") if getattr(cls, name) is not getattr(Node, name)]
-    if not names:
-        return cls
-    body: dict[str, Any] = {name: _guarded(cls, name, device, report) for name in names}
-    body |= {"__module__": cls.__module__, "__doc__": cls.__doc__}
-    return types.new_class(cls.__name__, (cls,), exec_body=lambda space: space.update(body))
+    body = {"__module__": cls.__module__, "__doc__": cls.__doc__}
+    body |= {name: _guarded(cls, name, device, report) for name in names}
+    return type(cls.__name__, (cls,), body) if names else cls
 
 
 def _guarded(cls: type[Node], name: str, device: Device, report: Callable[[str, str], None]) -> Any:
@@ -386,7 +370,5 @@ def _guarded(cls: type[Node], name: str, device: Device, report: Callable[[str, 
 
 def _state(device: Device) -> dict[str, Any]:
     """Return the state, without the buffer that is bound for uploads, which uploading itself changes."""
-    state = dict(vars(SavedState(device.raw, device.ctx)))
-    bind = device.raw.glBindBuffer
-    state["settings"] = [setting for setting in state["settings"] if setting[0] is not bind]
-    return state
+    state = vars(SavedState(device.raw, device.ctx))
+    return state | {"settings": [setting for setting in state["settings"] if setting[0] is not device.raw.glBindBuffer]}

@@ -48,7 +48,6 @@ _IN_PACKAGE = {
 }
 _IN_PROJECT = _IN_PLACE | {"where": "HERE = Path(__file__).parents[1]", "plugins": ', plugins=[HERE / "@nodes@"]'}
 _PROJECT_NODE = "lens_falloff"
-_ROOTS = ("nodes", "shaders")
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*\Z")
 _LONGEST_NAME = 40
 
@@ -249,9 +248,8 @@ def _files(name: str, kind: Kind, *, package: bool = False, nodes: str = "", fil
     files = {}
     if package:
         files = {f"{name}/{file.name.removesuffix('.in')}": _fill(file, words) for file in _templates("package")}
-        files |= {
-            f"{name}/{home}/__init__.py": f'"""{home.capitalize()} of `{words["package"]}`."""\n' for home in _ROOTS
-        }
+        for root in ("nodes", "shaders"):
+            files[f"{name}/{root}/__init__.py"] = f'"""{root.capitalize()} of `{words["package"]}`."""\n'
     homes = {"test": "tests", "node": nodes} if nodes else {}
     for template in _templates(kind):
         stem, suffix = template.name.removesuffix(".in").split(".")

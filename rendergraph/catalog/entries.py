@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -240,8 +240,8 @@ class Entries:
             return
         if "like" not in entry or "semantic" in entry:
             options["semantic"] = self._semantic(entry, "texture2d")
-        rules = dict.fromkeys(("layers", "samples", "bytes", "mips"), number_rule)
-        rules |= {"format": _word_rule, "size": _size_rule, "clear": _texel}
+        rules: dict[str, Callable[[Value], Any]] = {"format": _word_rule, "size": _size_rule, "clear": _texel}
+        rules |= dict.fromkeys(("layers", "samples", "bytes", "mips"), number_rule)
         options |= {key: rule(entry[key]) for key, rule in rules.items() if key in entry}
         if options.get("kind") == "buffer" and "bytes" not in options:
             text = f"the buffer '{name}' has no size; add outputs: {{{name}: {{bytes: N}}}} to the header"
@@ -331,7 +331,7 @@ class Entries:
             first = given.data[0] if isinstance(given.data, list) else given
             is_name = key in ("like", "size") and isinstance(first.data, str) and not first.data.startswith("$")
             if is_name and first.data not in inputs:
-                text = f"'{key}' names no input of this node: '{first.data}'{suggestion(first.data, inputs)}"
+                text = f"'{key}' names no input of this node: '{first.data}'{suggestion(str(first.data), inputs)}"
                 self.problems.append(first.problem("RG444", text))
 
     def warnings(self, cls: type[Node]) -> Iterator[Problem]:

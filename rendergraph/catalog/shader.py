@@ -9,13 +9,13 @@ import re
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
-from msgspec import Struct
+from msgspec.structs import replace
 
 from rendergraph.catalog.entries import Entries, number_rule
 from rendergraph.catalog.header import Header, read_header
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import Extensions, Input, Node, Port, WrittenPort, declaration_mistakes
-from rendergraph.errors import InputError, Problem, shown_file
+from rendergraph.errors import InputError, shown_file
 from rendergraph.glsl import Includes, read_text
 from rendergraph.resources import folder
 from rendergraph.steps import Steps
@@ -25,14 +25,8 @@ Record: TypeAlias = "Callable[[Any, Steps], None]"
 Threads: TypeAlias = "Callable[[Node, Steps], tuple[int, ...]]"
 
 
-class _ShaderType(Struct, frozen=True):
-    cls: type[Node]
-    warnings: tuple[Problem, ...]
-    text: str
-
-
 _MOST_TYPES = 256
-_TYPES: dict[tuple[object, ...], _ShaderType] = {}
+_TYPES: dict[tuple[object, ...], NodeType] = {}
 """Cached by everything that defines a type: a file is one class in all pipelines, which can then share passes."""
 
 
@@ -50,7 +44,7 @@ def load(name: str, listed: Listed, extensions: Extensions) -> NodeType:
         if len(_TYPES) >= _MOST_TYPES:
             _TYPES.clear()
         _TYPES[key] = found
-    return NodeType(name, listed.family, found.cls, file, file.parent, listed.plugin, found.warnings, text=found.text)
+    return replace(found, name=name, family=listed.family, plugin=listed.plugin)
 
 
 def _plugin_semantics(header: Header, extensions: Extensions) -> list[Any]:
@@ -61,7 +55,7 @@ def _plugin_semantics(header: Header, extensions: Extensions) -> list[Any]:
     return extensions.semantics() if foreign else []
 
 
-def _make(entries: Entries) -> _ShaderType:
+def _make(entries: Entries) -> NodeType:
     file, header = entries.file, entries.header
     entries.collect()
     if entries.problems:
@@ -79,7 +73,7 @@ def _make(entries: Entries) -> _ShaderType:
         raise InputError([found.relocate(entries.place_of(found.subject), context=where) for found in mistakes])
     lines = [line.rstrip() for line in entries.source.lines if line.strip()]
     text = "\n".join([*re.findall(r"^/\*---\n.*?\*/", entries.raw, re.DOTALL | re.MULTILINE)[:1], *lines])
-    return _ShaderType(cls, tuple(entries.warnings(cls)), text)
+    return NodeType("", "", cls, file, file.parent, warnings=tuple(entries.warnings(cls)), text=text)
 
 
 def _fullscreen(entries: Entries) -> Record:

@@ -251,15 +251,10 @@ class Extensions:
             _one("metric", metric.name, found)
         return found
 
-    def scene_keys(self, section: str) -> list[Added[SceneKey]]:
+    def scene_keys(self, section: Section) -> list[Added[SceneKey]]:
         """Return the keys of the entries in a section of scene files."""
-        return [
-            Added(key.name, key, source.plugin, source.file)
-            for source, extension in self._usable()
-            for name, keys in extension.scene_keys.items()
-            for key in keys
-            if name == section
-        ]
+        keys = [(key, source) for source, one in self._usable() for key in one.scene_keys.get(section, ())]
+        return [Added(key.name, key, source.plugin, source.file) for key, source in keys]
 
     def textures(self) -> dict[str, TextureKind]:
         """Return the kinds of generated textures with absolute shader paths; two with the same name are an error."""
@@ -270,7 +265,7 @@ class Extensions:
             if _one("kind of texture", one.name, added)
         }
 
-    def scene_key(self, section: str, name: str) -> Added[SceneKey] | None:
+    def scene_key(self, section: Section, name: str) -> Added[SceneKey] | None:
         """Return a key by name; two plugins with the same name are an error."""
         return _one(f"key of {section}", name, self.scene_keys(section))
 
@@ -282,9 +277,7 @@ class Extensions:
             rows += [(kind, added) for added in self.added(field)]
         for section in get_args(Section):
             rows += [(f"key of {section}", added) for added in self.scene_keys(section)]
-        return [
-            {"kind": kind, "name": added.name, "plugin": added.plugin, "doc": _doc(added.value)} for kind, added in rows
-        ]
+        return [{"kind": kind, "name": one.name, "plugin": one.plugin, "doc": _doc(one.value)} for kind, one in rows]
 
     def added(self, field: str) -> list[Added[Any]]:
         """Return what plugins add in a field of `Extension` that maps names to values."""

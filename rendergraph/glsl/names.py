@@ -14,15 +14,14 @@ Storage: TypeAlias = Literal["uniform", "in", "out", "buffer"]
 
 TOKEN = re.compile(r"[A-Za-z_]\w*|\.?\d[\w.]*|[^\s\w]")
 """A word, a number or a sign."""
+tokens: Callable[[str], list[str]] = TOKEN.findall
+"""Returns words, numbers and signs of a text without comments."""
 
 _WORD = re.compile(r"[A-Za-z_]\w*\Z")
 _STORAGE: dict[str, Storage] = {"uniform": "uniform", "in": "in", "out": "out", "buffer": "buffer"}
 _QUALIFIERS = frozenset(
-    re.findall(
-        r"\w+",
-        """const inout shared flat smooth noperspective centroid sample patch invariant precise coherent volatile
-        restrict readonly writeonly highp mediump lowp subroutine""",
-    )
+    """const inout shared flat smooth noperspective centroid sample patch invariant precise coherent volatile
+    restrict readonly writeonly highp mediump lowp subroutine""".split()  # noqa: SIM905 - reads best as text
 )
 _DIRECTIVE = re.compile(r"^[ \t]*#(?:\\\n|[^\n])*", re.MULTILINE)
 _MEMBERS = re.compile(
@@ -48,11 +47,6 @@ class Head(Struct, frozen=True):
     qualifiers: frozenset[str]
     rest: Sequence[str]
     layout: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-
-
-def tokens(text: str) -> list[str]:
-    """Return words, numbers and signs of a text without comments."""
-    return TOKEN.findall(text)
 
 
 def without_directives(text: str) -> str:
@@ -294,9 +288,8 @@ def _taken(text: str, uses: dict[str, list[Sequence[str]]], certain: bool) -> It
     branches: list[tuple[bool, bool | None, bool]] = []  # taken: outer, this (None: unknown), earlier
     for line in text.replace("\\\n", " ").split("\n"):
         directive = _CONDITION_LINE.match(line)
-        taken = not branches or (
-            branches[-1][0] and (branches[-1][1] is True if certain else branches[-1][1] is not False)
-        )
+        outer, holds, _ = branches[-1] if branches else (True, True, True)
+        taken = outer and (holds is True if certain else holds is not False)
         if directive is None:
             if taken:
                 yield line
@@ -306,8 +299,8 @@ def _taken(text: str, uses: dict[str, list[Sequence[str]]], certain: bool) -> It
             holds = _condition(word, rest, macros)
             branches.append((taken, holds, holds is True))
         elif word in ("elif", "else") and branches:
-            around, holds, done = branches[-1]
-            branches[-1] = around, False if done else None if holds is None or word == "elif" else True, done
+            done = branches[-1][2]
+            branches[-1] = outer, False if done else None if holds is None or word == "elif" else True, done
         elif word == "endif" and branches:
             branches.pop()
         elif taken and word == "define" and (found := _DEFINITION.match(rest)):

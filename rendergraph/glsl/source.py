@@ -174,11 +174,11 @@ class Includes:
         self._plugged = dict(plugged or {})
         self._versions = versions
         self._inherited = inherited
-        around = source.suffix == ".frag" and is_shadertoy(runs(source)[0])
-        if around:
-            self._before_shadertoy(runs(source)[0])
+        is_from_shadertoy = source.suffix == ".frag" and is_shadertoy(text := runs(source)[0])
+        if is_from_shadertoy:
+            self._before_shadertoy(text)
         self._file(source, root, Origin(prefix=prefix), [])
-        if around:
+        if is_from_shadertoy:
             end = "void main() { mainImage(values, gl_FragCoord.xy); image = vec4(values.rgb, 1.0); }"
             self._blocks.append(SourceBlock((end,), Origin(purpose="the end of a Shadertoy program")))
         return SourceText(tuple(self._blocks))
@@ -280,12 +280,7 @@ class Includes:
             record_read(target)
             if target.is_file():
                 return target, shared, home
-        known = {
-            path.relative_to(folder).as_posix()
-            for folder, _ in places
-            for path in folder.rglob("*")
-            if path.suffix == ".glsl"
-        }
+        known = {path.relative_to(folder).as_posix() for folder, _ in places for path in folder.rglob("*.glsl")}
         where = "beside the file" if beside else "in shaders/include"
         if len(places) > 1:
             where += " or among the shaders of what its node extends"

@@ -119,11 +119,8 @@ def unfit_sampler(step: Step, declared: str, read: Read, resources: Mapping[str,
     desc = resources[read.resource].desc
     assert isinstance(desc, TextureDesc)
     if desc.samples > 1 and declared == right.replace("MS", ""):
-        text = (
-            f"'{read.name}' is read as one sample per texel ({declared}), but '{read.resource}' has {desc.samples} "
-            f"samples; resolve it first, or declare it as {right}"
-        )
-        return step.problem("RG214", text)
+        but = f"'{read.resource}' has {desc.samples} samples; resolve it first, or declare it as {right}"
+        return step.problem("RG214", f"'{read.name}' is read as one sample per texel ({declared}), but {but}")
     what = f"a {read.kind} of {desc.format}" + (f" with {desc.samples} samples" if desc.samples > 1 else "")
     how = ", read with `compare`," if read.sampler.compare else ""
     text = f"'{read.name}' is declared as {declared}, but '{read.resource}'{how} is {what}; declare it as {right}"

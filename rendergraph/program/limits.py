@@ -140,9 +140,7 @@ def groups_of(step: Step, local: tuple[int, int, int], limits: Mapping[str, int]
         groups = x, y, z
     most = limits["groups_x"], limits["groups_y"], limits["groups_z"]
     if any(count > limit for count, limit in zip(groups, most, strict=True)):
-        text = (
-            f"it has {' × '.join(map(str, groups))} work groups; this device supports {' × '.join(map(str, most))}, "
-            "larger groups (`layout(local_size_x = …)`) make fewer of them"
-        )
+        text = f"it has {' × '.join(map(str, groups))} work groups; this device supports {' × '.join(map(str, most))}"
+        text += ", larger groups (`layout(local_size_x = …)`) make fewer of them"
         raise RenderError(step.problem("RG435", text))
     return groups

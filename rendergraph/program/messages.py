@@ -27,9 +27,7 @@ _FORMS = (
     re.compile(r"\s*\d+\((?P<line>\d+)\)\s*:\s*(?P<kind>(?:fatal )?error|warning)\s+(?:[A-Z]\d+\s*)?:\s*(?P<text>.*)"),
     re.compile(r"\s*(?P<kind>ERROR|WARNING):\s*\d+:(?P<line>\d+):\s*(?:(?:error|warning)\(#\d+\)\s*)?(?P<text>.*)"),
 )
-_UNKNOWN = re.compile(
-    r"undeclared|undefined variable|no function with name|no matching overloaded function", re.IGNORECASE
-)
+_UNKNOWN = re.compile(r"(?i)undeclared|undefined variable|no function with name|no matching overloaded function")
 """Drivers' phrases for an unknown name."""
 _CALL = re.compile(r"(?P<before>.*`\w+\((?P<types>[^()]*)\)'); candidates are:")
 _CANDIDATE = re.compile(r"\s{3,}\w+ \w+\((?P<types>[^()]*)\)\s*\Z")
@@ -137,8 +135,7 @@ def _located(rows: Sequence[str], text: StageText, code: str) -> list[Problem]:
 
 
 def _problem(code: str, message: DriverMessage, stage: StageText) -> Problem:
-    rows, text, line = stage.source, message.text.strip(), message.line
-    severity: Literal["error", "warning"] = "warning" if message.is_warning else "error"
+    rows, text, line, severity = stage.source, message.text.strip(), message.line, message.severity
     if not 1 <= line <= len(rows.lines):  # about the whole text, such as recursion
         spot = declared_at(rows, _FUNCTION.findall(text)) or (_first_place(rows), "")
         return Problem(code, f"{stage.who}: {text}", *spot, severity)
@@ -226,7 +223,7 @@ class DriverMessage(Struct, frozen=True):
     text: str
     line: int
     column: int
-    is_warning: bool = False
+    severity: Literal["error", "warning"]
 
 
 def causes(rows: Sequence[str], source: SourceText) -> list[DriverMessage]:
@@ -236,22 +233,19 @@ def causes(rows: Sequence[str], source: SourceText) -> list[DriverMessage]:
     one; only the closest candidates for a call are listed.
     """
     found = list(_with_candidates([message for row in rows if (message := _read(row)) is not None]))
-    errors = [message for message in found if not message.is_warning]
+    errors = [message for message in found if message.severity == "error"]
     if not errors:
         return list(dict.fromkeys(found))
-    unknown = {
-        name: None for message in errors if _UNKNOWN.search(message.text) for name in _QUOTED.findall(message.text)
-    }
-    words: list[str] = re.findall(r"[A-Za-z_]\w*", source.text)
-    known = {*words, *_BUILT_IN.split()} - unknown.keys()
+    unknown = {name for message in errors if _UNKNOWN.search(message.text) for name in _QUOTED.findall(message.text)}
+    known = {*_WORD.findall(source.text), *_BUILT_IN.split()} - unknown
     kept: list[DriverMessage] = []
-    reported: dict[str, int] = {}
+    reported: set[str] = set()
     begun: set[int] = set()
     for message in errors:
         statement = _statement(source, message.line)
         if _UNKNOWN.search(message.text):
             if message.text not in reported:
-                reported[message.text] = message.line
+                reported.add(message.text)
                 kept.append(replace(message, text=message.text + _near(message.text, known)))
         elif statement not in begun and not re.search(r"\berror\b", message.text):
             kept.append(message)
@@ -266,7 +260,8 @@ def _read(row: str) -> DriverMessage | None:
     if match is None:
         return None
     column = int(match.groupdict().get("column") or 0)
-    return DriverMessage(match["text"].rstrip(), int(match["line"]), column, "warning" in match["kind"].lower())
+    severity: Literal["error", "warning"] = "warning" if "warning" in match["kind"].lower() else "error"
+    return DriverMessage(match["text"].rstrip(), int(match["line"]), column, severity)
 
 
 def _with_candidates(found: Sequence[DriverMessage]) -> Iterator[DriverMessage]:
@@ -317,7 +312,7 @@ def _near(text: str, known: set[str]) -> str:
 
 def _unknown_type(source: SourceText, line: int) -> str:
     """Explain Mesa's message about an undeclared name, where it expects a type or has taken one for a value."""
-    for name in re.findall(r"[A-Za-z_]\w*", source.lines[line - 1]) if line <= len(source.lines) else ():
+    for name in _WORD.findall(source.lines[line - 1]) if line <= len(source.lines) else ():
         if not re.search(_DEFINES.format(name), source.text, re.MULTILINE) and (include := _include_with(name)):
             return f": nothing declares '{name}'; #include <{include}> does"
     return ": a name that nothing declares"

@@ -127,8 +127,9 @@ def text_key(
         names = tuple((name, 0) for name, _ in each.uniforms)
         return replace(each, reads=(), uniforms=names), made_of(each.node), tuple(map(seen, each.reads))
 
-    functions, uses = tuple(map(provided, step.functions)), tuple(map(seen, (*step.reads, *step.writes)))
-    return made_of(step.node), replace(step, **_IRRELEVANT), functions, uses
+    uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
+    functions = tuple(map(provided, step.functions))
+    return made_of(step.node), replace(step, **_IRRELEVANT), functions, tuple(map(seen, uses))
 
 
 class StepTexts(Struct, eq=False):

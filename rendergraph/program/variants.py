@@ -16,14 +16,8 @@ from rendergraph.scene.pack import PackedScene
 from rendergraph.scene.scene_data import data_macros, expected_arrays
 from rendergraph.steps import Step
 
-FIXED_BLOCKS = {
-    "camera_block": 0,
-    "frame_block": 1,
-    "light_block": 2,
-    "material_block": 3,
-    "material_uv_block": 4,
-    "environment_block": 5,
-}
+_BLOCKS = ("camera_block", "frame_block", "light_block", "material_block", "material_uv_block", "environment_block")
+FIXED_BLOCKS = {name: binding for binding, name in enumerate(_BLOCKS)}
 """Binding points of the framework's blocks; view tables follow."""
 LARGEST_BLOCK = 65536
 """Size of a uniform block in bytes on desktop drivers; OpenGL guarantees 16384."""

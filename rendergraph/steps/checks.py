@@ -117,9 +117,8 @@ def texels(
         text = f"'{name}' takes {' × '.join(map(str, shape))} numbers (layers, height, width, channels)"
         raise Misuse(f"{text}, got an array of shape {array.shape}", "RG432")
     if texel.is_bytes and array.dtype.kind != "f" and not np.array_equal(array, np.clip(array, 0, 255)):
-        raise Misuse(
-            f"'{name}' takes bytes, or floats from 0 to 1, got {array.dtype} from {array.min()} to {array.max()}"
-        )
+        given = f"{array.dtype} from {array.min()} to {array.max()}"
+        raise Misuse(f"'{name}' takes bytes, or floats from 0 to 1, got {given}")
     if texel.is_bytes and array.dtype.kind == "f":
         array = np.rint(255 * np.clip(array, 0.0, 1.0)).astype(np.uint8)
     return array.reshape(shape)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -45,7 +45,14 @@ _Fraction: TypeAlias = Annotated[float, Range(0, 1)]
 DepthBounds: TypeAlias = Annotated[tuple[_Fraction, _Fraction], "the least and the greatest depth, 0 to 1"]
 
 
-class Blend(Struct, frozen=True):
+class _Checked(Struct, frozen=True):
+    """A value whose fields all fit their annotations."""
+
+    def __post_init__(self) -> None:
+        validated(self)
+
+
+class Blend(_Checked, frozen=True):
     """Blending of one target: `source × src + destination × dst` with `op` in between."""
 
     src: BlendFactor = "one"
@@ -54,19 +61,12 @@ class Blend(Struct, frozen=True):
     dst_alpha: BlendFactor | None = None
     op: BlendOp = "add"
 
-    def __post_init__(self) -> None:
-        validated(self)
-
     @property
     def takes_destination(self) -> bool:
         """Whether the result depends on the target's contents."""
-        factors = [name or "" for name in (self.src, self.dst, self.src_alpha, self.dst_alpha)]
-        dst_alpha = self.dst if self.dst_alpha is None else self.dst_alpha
-        return (
-            (self.dst, dst_alpha) != ("zero", "zero")
-            or self.op in ("min", "max")
-            or any("dst" in name for name in factors)
-        )
+        drops_it = self.dst == "zero" and self.dst_alpha in (None, "zero") and self.op not in ("min", "max")
+        factors = (self.src, self.dst, self.src_alpha or "", self.dst_alpha or "")
+        return not drops_it or any("dst" in name for name in factors)
 
 
 ADD = Blend("one", "one")
@@ -75,7 +75,7 @@ PREMULTIPLIED = Blend("one", "one_minus_src_alpha")
 MULTIPLY = Blend("dst_color", "zero")
 
 
-class StencilFace(Struct, frozen=True):
+class StencilFace(_Checked, frozen=True):
     """Stencil test and operations of one face."""
 
     func: Compare = "always"
@@ -86,21 +86,15 @@ class StencilFace(Struct, frozen=True):
     depth_fail: StencilOp = "keep"
     depth_pass: StencilOp = "keep"
 
-    def __post_init__(self) -> None:
-        validated(self)
 
-
-class Stencil(Struct, frozen=True):
+class Stencil(_Checked, frozen=True):
     """Stencil state; a `back` of None equals the front."""
 
     front: StencilFace = StencilFace()
     back: StencilFace | None = None
 
-    def __post_init__(self) -> None:
-        validated(self)
 
-
-class State(Struct, frozen=True):
+class State(_Checked, frozen=True):
     """The fixed-function state of a step.
 
     Attributes:
@@ -141,9 +135,6 @@ class State(Struct, frozen=True):
     clip_distances: Annotated[int, Range(0, 8)] = 0
     wireframe: bool = False
 
-    def __post_init__(self) -> None:
-        validated(self)
-
 
 class Read(Struct, frozen=True, gc=False):
     """A resource that a step reads, and how.
@@ -175,7 +166,6 @@ class Write(Struct, frozen=True, gc=False):
 
     Attributes:
         name: the name in the shader, or the port's name.
-        resource: id of the resource.
         version: the version that this write creates; it continues `version - 1` if that is at least 1.
         load: `clear` first, `load` the old contents, or `discard`.
         clear: value of every channel, or one per channel.
@@ -200,7 +190,6 @@ class FunctionBinding(Struct, frozen=True):
         node: the providing node's id.
         shader: the file of its text, relative to the providing node's shaders.
         reads: textures that the text samples, by the names in its text.
-        defines, uniforms: those of the provider.
         includes: parameters whose choice comes from a plugin, in capitals, with the plugin's include.
     """
 
@@ -240,12 +229,9 @@ class Step(Struct, frozen=True, gc=False):
         kind: the kind; the framework adds a `copy` of a version that is needed after it is overwritten.
         shaders: stage to file name (`fragment`, `vertex`, `geometry`, `compute`), relative to the node's shaders, or
             `<name>` for one in `shaders/include/`.
-        functions: providers of functions that its shader calls.
         includes: parameters whose choice comes from a plugin, in capitals, with the plugin's include.
         defines: names and program text.
-        uniforms: names and values of this step's uniforms.
-        size: width and height of the target in texels.
-        samples: samples of the target.
+        size, samples: width and height of the target in texels, and its samples.
         view: id of the view table of a geometry step.
         view_index: which view of it; None if the shader chooses by `gl_Layer`.
         objects: which objects a geometry step draws: `all`, `opaque`, `transparent`, `casters`, or names.
@@ -361,8 +347,6 @@ class Upload(Struct, frozen=True, eq=False):
 
 
 Role = Literal["transient", "internal", "output", "history", "kept", "scene"]
-_COPIES: Mapping[str, int] = {"history": 2, "scene": 0}
-"""Roles whose number of copies is not 1."""
 
 
 class Resource(Struct, frozen=True, gc=False):
@@ -370,7 +354,6 @@ class Resource(Struct, frozen=True, gc=False):
 
     Attributes:
         id: `node.port` of its first writer; an `InOut` continues the id.
-        desc: its description.
         role: `transient` and `internal` may be aliased; `output`, `history` and `kept` live the whole frame,
             the last two from frame to frame; a `scene` resource already exists, and takes no memory here.
         first: every channel's value before the first frame, for history.
@@ -390,4 +373,4 @@ class Resource(Struct, frozen=True, gc=False):
     @property
     def bytes(self) -> int:
         """Bytes by formula; a history texture has two copies, and resources of the scene count 0."""
-        return self.desc.bytes * _COPIES.get(self.role, 1)
+        return self.desc.bytes * {"history": 2, "scene": 0}.get(self.role, 1)

@@ -114,9 +114,9 @@ class Steps:
 
     def connected(self, port: Port | None) -> bool:
         """Return whether an input is connected; False for one that the class drops."""
-        return port is not None and self.facts.connected(
-            checks.declared_port(self.ports, port, "connected's argument").name
-        )
+        if port is None:
+            return False
+        return self.facts.connected(checks.declared_port(self.ports, port, "connected's argument").name)
 
     def used(self, port: Port | None) -> bool:
         """Return whether any node reads an output; unused ones, and ones that the class drops, need not be written."""
@@ -373,8 +373,7 @@ class Steps:
         """
         part = checks.part_of(self.ports, out, "out")
         targets = checks.targets(self.ports, part)
-        desc = self._desc(part.port)
-        if desc is not None:
+        if desc := self._desc(part.port):
             checks.check_part(part, desc)
         if callable(values):
             function = getattr(values, "__func__", values)  # a reimported module has new functions
@@ -383,10 +382,8 @@ class Steps:
             values = checks.texels(part.port.name, values, desc, part.mip, part.layer)
             content = f"{values.dtype} {values.shape} {sha1(values.tobytes()).hexdigest()}"
         given: dict[str, Any] = {"values": Upload(values, tuple(changes_with), content)}
-        out_of = tuple(targets.items())
-        self._recorder.add(
-            StepRequest("upload", out=out_of, uniforms=given, options={"label": label}, caller=_caller())
-        )
+        out_of, caller = tuple(targets.items()), _caller()
+        self._recorder.add(StepRequest("upload", out=out_of, uniforms=given, options={"label": label}, caller=caller))
 
     def mipmaps(self, out: Port) -> None:
         """Generate mips 1 and up from mip 0 by 2×2 averages."""
@@ -417,20 +414,18 @@ class Steps:
         **options: Any,
     ) -> None:
         if out is None:
-            targets = {
-                name: port.whole
-                for name, port in self.ports.items()
-                if isinstance(port, Output | InOut) and self._recorder.used(port)
-            }
+            written = {name: port for name, port in self.ports.items() if isinstance(port, Output | InOut)}
+            targets = {name: port.whole for name, port in written.items() if self._recorder.used(port)}
         else:
             targets = checks.targets(self.ports, out)
         textures, uniforms = self._bindings(bindings)
         for part in (*targets.values(), *textures.values()):
-            if isinstance(part, Part) and (part.mip is not None or part.layer is not None):
-                desc = self._desc(part.port)
-                if desc is not None:
-                    checks.check_part(part, desc)
-        self._check_options(options)
+            if isinstance(part, Part) and (part.mip, part.layer) != (None, None) and (desc := self._desc(part.port)):
+                checks.check_part(part, desc)
+        if options.get("view") is not None:
+            view = checks.declared_port(self.ports, options["view"], "view")
+            if not isinstance(view, Views | Input | InOut):
+                raise Misuse(f"view is {quoted(view)}; it is a Views port or an input that carries views")
         if "over" in options:
             options["invocations"] = self._invocations(options.pop("over"), targets, textures)
         reads: Mapping[str, Target] = textures
@@ -438,19 +433,18 @@ class Steps:
         if reads_all:
             every = self._recorder.reads(targets.values())
             reads = {name: port for name, port in every.items() if bindings.get(name, port) is not None}
-        self._recorder.add(
-            StepRequest(
-                kind=kind,
-                shaders=tuple([(stage, file) for stage, file in shaders.items() if file is not None]),
-                out=tuple(targets.items()),
-                bindings=reads,
-                uniforms=uniforms,
-                defines={name: checks.macro(name, value) for name, value in (defines or {}).items()},
-                options=options,
-                caller=caller,
-                reads_all=reads_all and caller is not None and bool(reads),
-            )
+        request = StepRequest(
+            kind=kind,
+            shaders=tuple([(stage, file) for stage, file in shaders.items() if file is not None]),
+            out=tuple(targets.items()),
+            bindings=reads,
+            uniforms=uniforms,
+            defines={name: checks.macro(name, value) for name, value in (defines or {}).items()},
+            options=options,
+            caller=caller,
+            reads_all=reads_all and caller is not None and bool(reads),
         )
+        self._recorder.add(request)
 
     def _bindings(
         self, bindings: Mapping[str, Target | UniformValue | None]
@@ -469,12 +463,6 @@ class Steps:
                 raise Misuse(f"{name} is the view table '{port.name}'; give it as `view=` to a step that draws")
             textures[name] = checks.part_of(self.ports, value, name) if isinstance(value, Part) else port
         return textures, uniforms
-
-    def _check_options(self, options: Mapping[str, Any]) -> None:
-        if options.get("view") is not None:
-            port = checks.declared_port(self.ports, options["view"], "view")
-            if not isinstance(port, Views | Input | InOut):
-                raise Misuse(f"view is {quoted(port)}; it is a Views port or an input that carries views")
 
     def _invocations(
         self, over: Target | Counts | None, targets: Mapping[str, Part], reads: Mapping[str, Target]
