@@ -6,7 +6,6 @@ from rendergraph.declare import Extension as Extension
 from rendergraph.declare import Facts as Facts
 from rendergraph.declare import Function as Function
 from rendergraph.declare import History as History
-from rendergraph.declare import Image as Image
 from rendergraph.declare import InOut as InOut
 from rendergraph.declare import Input as Input
 from rendergraph.declare import InputFile as InputFile
@@ -27,6 +26,7 @@ from rendergraph.declare import casting_lights as casting_lights
 from rendergraph.declare import define as define
 from rendergraph.declare import param as param
 from rendergraph.declare import structural as structural
+from rendergraph.declare.extensions import Image as Image
 from rendergraph.errors import SceneError as SceneError
 from rendergraph.steps import ADD as ADD
 from rendergraph.steps import ALPHA as ALPHA

@@ -93,15 +93,15 @@ class _Check:
         self._trace.touch()
         arguments |= {"trace": str(self._trace)}
         self._child = ChildProcess(f"{__name__}:main", arguments, {"TMPDIR": folder}, subprocess.PIPE)
-        self._process, self._stdout = self._child.process, self._child.process.stdout
-        assert self._stdout is not None
+        self._process = self._child.process
+        assert self._process.stdout is not None
+        self._stdout = self._process.stdout
         self._output = b""
         self._stage = self._variant = ""
 
     def close(self) -> None:
         self._child.kill()
-        if self._stdout is not None:
-            self._stdout.close()
+        self._stdout.close()
 
     def report(self) -> Report:
         for message in self._messages():
@@ -120,7 +120,6 @@ class _Check:
 
     def _messages(self) -> Iterator[object]:
         """Yield messages until the process ends or closes its pipe; raise InputError if a stage takes too long."""
-        assert self._stdout is not None
         pipe, output = self._child.pipe.fileno(), self._stdout.fileno()
         sources, rest = {pipe, output}, b""
         end = time.monotonic() + self._seconds()

@@ -39,10 +39,8 @@ def find_node(file: Path, plugins: Sequence[Path] = ()) -> NodeType:
     """Return the type that a file defines, as part of an installed package or of a plugin's folders, or alone."""
     file = file.resolve()
     catalog = Catalog.discover(plugins)
-    if file.stem in catalog:
-        found = catalog.get(file.stem)
-        if found.file.resolve() == file:
-            return found
+    if file.stem in catalog and (found := catalog.get(file.stem)).file.resolve() == file:
+        return found
     named = [*plugins, _plugin_of(file)]
     try:
         return Catalog.discover(named).get(file.stem)
@@ -54,10 +52,8 @@ def find_node(file: Path, plugins: Sequence[Path] = ()) -> NodeType:
 
 def _plugin_of(file: Path) -> Path:
     """Return the path for `--plugin`: the folder above `nodes/` and `shaders/`, or else the file."""
-    for folder in file.parents:
-        if folder.name == "nodes" and (folder.parent / "shaders").is_dir():
-            return folder.parent
-    return file
+    plugins = (folder.parent for folder in file.parents if folder.name == "nodes")
+    return next((plugin for plugin in plugins if (plugin / "shaders").is_dir()), file)
 
 
 def examine(

@@ -33,7 +33,7 @@ _VALUES = {  # by semantic, of `vec2 at` from 0 to 1 and `float wave` from 0 to 
 _ANY_VALUE = "vec4(at, wave, 1.0)"
 _DEPTHS = ("depth", "shadow_map")
 _BUFFER_BYTES = 1 << 20
-_FROM = "from-"  # prefix of outputs that show a source; no port begins like this
+FROM = "from-"  # prefix of outputs that show a source; no port begins like this
 
 
 MOST_VARIANTS = 200
@@ -155,7 +155,7 @@ class HarnessGraph:
             link = f"{source.name}.made"
             inputs[name] = [link] if isinstance(port, api.Input) and port.many else link
             if name in self.fed and not several:
-                outputs[_FROM + name] = link
+                outputs[FROM + name] = link
         if variant.outputs:
             nodes[node] = {"type": node, "inputs": inputs, "params": dict(variant.params)}
         for name in variant.outputs:
@@ -169,10 +169,6 @@ class HarnessGraph:
         file = self.folder / "check.yaml"
         file.write_text(json.dumps(pipeline), encoding="utf-8")
         return file
-
-    def input_of(self, output: str) -> str:
-        """Return the input whose source an output of the pipeline shows; empty for an output of the node."""
-        return output.removeprefix(_FROM) if output.startswith(_FROM) else ""
 
 
 # --- sources ---------------------------------------------------------------------------------------------------------

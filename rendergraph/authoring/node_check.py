@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import structs
 
-from rendergraph.authoring.harness import HarnessGraph, NodeVariant
+from rendergraph.authoring.harness import FROM, HarnessGraph, NodeVariant
 from rendergraph.catalog import NodeType
 from rendergraph.compile.executable import CompiledStep, Draw
 from rendergraph.declare import Node
@@ -253,7 +253,8 @@ class NodeCheck:
 
     def _compare(self, one: Mapping[str, npt.NDArray[Any]], other: Mapping[str, npt.NDArray[Any]]) -> None:
         for name in one:
-            if port := self.harness.input_of(name):
+            if name.startswith(FROM):
+                port = name.removeprefix(FROM)
                 if not np.array_equal(self._fed[name], one[name]):
                     text = f"the node changes its input '{port}'; inputs are read-only, use an InOut port to write"
                     self._report(Problem("RG457", text, self._declaration(port)))

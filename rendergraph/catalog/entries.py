@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rendergraph import textures
-from rendergraph.catalog.header import Header
-from rendergraph.catalog.parameter import ParameterReader, is_parameter
+from rendergraph.catalog.header import Header, ParameterReader, is_parameter
 from rendergraph.declare import Extensions, Facts, Input, Node, Output, Parameter, Port, WrittenPort
 from rendergraph.document import Value
 from rendergraph.errors import Place, Problem, shown_file, suggestion

@@ -22,7 +22,6 @@ from rendergraph.steps import Steps
 from rendergraph.textures import SEMANTICS, SIGNATURES
 
 Record: TypeAlias = "Callable[[Any, Steps], None]"
-Threads: TypeAlias = "Callable[[Node, Steps], tuple[int, ...]]"
 
 
 _MOST_TYPES = 256
@@ -121,7 +120,7 @@ def _local_size(entries: Entries, name: str) -> int:
     return value
 
 
-def _threads(entries: Entries) -> Threads:
+def _threads(entries: Entries) -> Callable[[Node, Steps], tuple[int, ...]]:
     """Return the thread counts: the size of a texture, or the numbers of the header."""
     given = entries.header.threads
     if given is not None and (not isinstance(given.data, str) or given.data.startswith("$")):

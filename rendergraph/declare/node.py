@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache, cached_property
 from inspect import get_annotations
 from pathlib import Path
@@ -85,9 +85,8 @@ class Parameter(Struct, frozen=True, dict=True):
             TypeError: it does not fit the type: `expected a whole number`.
             ValueError: a number is outside the limits: `must be at least 1`.
         """
-        convert, fits = self._taken
-        found = convert(value)
-        if not fits(found):
+        found = conversion_to(self.type)(value)
+        if not test_of(self.type)(found):
             raise TypeError(f"expected {self.takes()}")
         if wrong := self.violation(found):
             raise ValueError(wrong)
@@ -97,10 +96,6 @@ class Parameter(Struct, frozen=True, dict=True):
         """Return what a value outside the limits must be; None for other values."""
         parts: tuple[Any, ...] = value if isinstance(value, tuple) else (value,)
         return next(filter(None, (self.limits.violation(number) for number in parts if _is_number(number))), None)
-
-    @cached_property
-    def _taken(self) -> tuple[Callable[[Any], Any], Callable[[Any], bool]]:
-        return conversion_to(self.type), test_of(self.type)
 
 
 def _listed(annotation: Any) -> tuple[Any, ...]:

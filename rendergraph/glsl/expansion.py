@@ -17,6 +17,7 @@ from itertools import pairwise
 from math import prod
 
 from msgspec import Struct
+from msgspec.structs import astuple
 
 from rendergraph.errors import InputError, Problem
 from rendergraph.glsl.source import Origin, SourceText
@@ -221,8 +222,7 @@ class _Macros:
 
 
 def _worst(growths: Sequence[_Growth]) -> _Growth:
-    words, times, depth = (max(each) for each in zip(*((g.words, g.times, g.depth) for g in growths), strict=True))
-    return _Growth(words, times, depth)
+    return _Growth(*map(max, zip(*map(astuple, growths), strict=True)))
 
 
 def _sorted(needs: Mapping[str, Set[str]]) -> list[str]:

@@ -26,6 +26,11 @@ class Token(str):
 
     at: int
 
+    def __new__(cls, match: re.Match[str]) -> Token:
+        word = super().__new__(cls, match.group())
+        word.at = match.start()
+        return word
+
 
 class Global(Struct, frozen=True):
     """One declaration at the top level.
@@ -92,7 +97,7 @@ def globals_of(text: str) -> Globals:
     plain = without_directives(text)
     found: dict[str, Global] = {}
     input_layout: dict[str, tuple[str, ...]] = {}
-    for statement, body in statements(_words(plain)):
+    for statement, body in statements(list(map(Token, TOKEN.finditer(plain)))):
         begin = head(statement)
         storage, rest, more = begin.storage, begin.rest, (begin.qualifiers, begin.layout)
         if storage == "in" and not rest:
@@ -106,15 +111,6 @@ def globals_of(text: str) -> Globals:
                 one = Global(storage, str(rest[0]), str(name), _at(name), array, *more, initialiser)
                 found.setdefault(one.name, one)
     return Globals(tuple(found.values()), {one[1]: int(one[2]) for one in _MACRO.finditer(text)}, input_layout)
-
-
-def _words(text: str) -> list[str]:
-    found: list[str] = []
-    for match in TOKEN.finditer(text):
-        word = Token(match.group())
-        word.at = match.start()
-        found.append(word)
-    return found
 
 
 def _at(word: str) -> int:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 
 from msgspec.structs import replace
 
@@ -30,7 +30,12 @@ def with_formats(
     source: SourceText, step: Step, resources: Mapping[str, Resource], macros: Mapping[str, str]
 ) -> SourceText:
     """Add the port's format to every image without one (RG427 if they disagree, RG430 if no port belongs to it)."""
-    images = dict(_images(step, resources))
+    uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
+    images = {
+        use.name: (use, desc)
+        for use in uses
+        if use.use == "image" and isinstance(desc := getattr(resources.get(use.resource), "desc", None), TextureDesc)
+    }
     lines, origins = list(source.lines), list(source.origins)
     problems: list[Problem] = []
     for number, line in enumerate(lines):
@@ -69,14 +74,6 @@ def _unknown(step: Step, match: re.Match[str], images: Collection[str]) -> str:
     text = f"{files} declares the image '{match['name']}', but the step loads and stores no port of that name"
     hint = suggestion(match["name"], images) if images else ""
     return text + (hint or f"; give {match['name']}=PORT.stored(), or name it in `out`")
-
-
-def _images(step: Step, resources: Mapping[str, Resource]) -> Iterator[tuple[str, tuple[Read | Write, TextureDesc]]]:
-    uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
-    for use in uses:
-        desc = resources[use.resource].desc if use.resource in resources else None
-        if use.use == "image" and isinstance(desc, TextureDesc):
-            yield use.name, (use, desc)
 
 
 def _stated(match: re.Match[str]) -> str | None:

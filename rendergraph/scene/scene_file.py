@@ -17,7 +17,8 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from rendergraph.declare import Section, TextureKind
+from rendergraph.declare import TextureKind
+from rendergraph.declare.extensions import Section
 from rendergraph.document import Source, Value, from_plain, load, merge_patch, shown
 from rendergraph.errors import InputError, Option, Problem, suggestion
 from rendergraph.facts import NO_EXTRA, Extra

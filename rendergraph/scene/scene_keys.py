@@ -8,7 +8,8 @@ from typing import Annotated, Any, get_args
 
 from msgspec.structs import replace
 
-from rendergraph.declare import Extensions, Section, TextureKind
+from rendergraph.declare import Extensions, TextureKind
+from rendergraph.declare.extensions import Section
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.keys import Codes, Key, MapOf, Recursive, Table, schema
 from rendergraph.keys.values import (

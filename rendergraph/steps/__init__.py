@@ -15,7 +15,6 @@ from rendergraph.steps.model import (
     MULTIPLY,
     PREMULTIPLIED,
     Blend,
-    BlendFactor,
     Compare,
     FunctionBinding,
     Read,
@@ -24,7 +23,6 @@ from rendergraph.steps.model import (
     State,
     Stencil,
     StencilFace,
-    StencilOp,
     Step,
     UniformValue,
     Upload,
@@ -32,4 +30,4 @@ from rendergraph.steps.model import (
     Where,
     Write,
 )
-from rendergraph.steps.recorder import BUFFER_OPTIONS, Recorder, StepRequest, Steps, Target
+from rendergraph.steps.recorder import BUFFER_OPTIONS, StepRequest, Steps

@@ -126,10 +126,10 @@ def texels(
 
 def targets(ports: Mapping[str, Port], out: object) -> dict[str, Part]:
     """Return the targets of `out`, by their names in the shader."""
-    if isinstance(out, Port | Part):
+    if not isinstance(out, Mapping):
         part = part_of(ports, out, "out")
         found = {part.port.name: part}
-    elif isinstance(out, Mapping):
+    else:
         if not out:
             raise Misuse("out is empty; name what the step writes, or leave it out for every output that is used")
         for name in out:
@@ -137,9 +137,6 @@ def targets(ports: Mapping[str, Port], out: object) -> dict[str, Part]:
                 raise Misuse(f"out has the key {quoted(name)}; the keys are the shader's names")
         given = {name: value for name, value in out.items() if value is not None or name in ports}  # None: dropped
         found = {name: part_of(ports, value, f"out[{name!r}]") for name, value in given.items()}
-    else:
-        part_of(ports, out, "out")  # reports what it is
-        raise AssertionError
     for name, part in found.items():
         if not isinstance(part.port, WrittenPort):
             kind = type(part.port).__name__.lower()
