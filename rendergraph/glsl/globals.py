@@ -37,9 +37,8 @@ class Global(Struct, frozen=True):
 
     Attributes:
         storage: `uniform`, `in`, `out`, or `buffer` for a storage block.
-        type: the GLSL type, empty for a block.
+        type, initialiser: as in the text, empty for a block and without one.
         layout: `location`, `binding`, … with the text after `=`, empty for plain words (`rgba16f`).
-        initialiser: the text after `=`, empty without one.
     """
 
     storage: Storage

@@ -96,8 +96,7 @@ def link_problems(message: str, texts: Mapping[str, StageText]) -> list[Problem]
     if lacking and lacking[1] in texts:  # the message names what is missing
         return [Problem("RG411", text, _first_place(texts[lacking[1]].source))]
     for stage_text in reversed(list(texts.values())):
-        spot = declared_at(stage_text.source, _QUOTED.findall(message))
-        if spot is not None:
+        if spot := declared_at(stage_text.source, _QUOTED.findall(message)):
             return [Problem("RG411", text, *spot)]
     return [Problem("RG411", text, _first_place(last.source))]
 
