@@ -45,8 +45,7 @@ def command(
     from rendergraph.images.files import write_file
     from rendergraph.session import stages
     from rendergraph.session.gpu import Gpu
-    from rendergraph.viewer.export import Exported, export
-    from rendergraph.viewer.site import index
+    from rendergraph.viewer.export import Exported, export, index
     from rendergraph.viewer.view_state import ViewState
 
     selections = {Path(pipeline).stem: select(pipeline) for pipeline in pipelines}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ from rendergraph.declare import FileContent, InOut, Input, Parameter
 from rendergraph.diagrams import graph_json, plan_json
 from rendergraph.document import Value
 from rendergraph.errors import InputError
-from rendergraph.link import Graph, GraphNode
+from rendergraph.link import GraphNode
 from rendergraph.read import entries
 from rendergraph.scene.animate import moves
 from rendergraph.session.values import Linked, Planned
@@ -20,26 +20,19 @@ from rendergraph.typecheck import accepts
 def describe(planned: Planned) -> dict[str, Any]:
     """Return everything but pictures and times, as plain JSON values."""
     linked = planned.linked
-    graph, spec = linked.graph, linked.spec
-    families = linked.catalog.families()
-    read: dict[str, set[str]] = {node.id: set() for node in graph.nodes}
+    graph, spec, families = linked.graph, linked.spec, linked.catalog.families()
     ends = [end for reader in graph.nodes for links in reader.inputs.values() for end in links]
-    for end in (*ends, *graph.outputs.values()):
-        read[end.node].add(end.port)
+    ends += graph.outputs.values()
     written = entries(spec.tree, "nodes")
     nodes = {
         node.id: {
             "type": node.type.name,
             "base": _base(written[node.id], spec.path) if node.id in written else "",
             "doc": (node.type.cls.__doc__ or "").strip().partition("\n\n")[0].replace("\n", " "),
-            **_types(linked, node, read[node.id], families.get(node.type.family, ())),
-            "parameters": {
-                name: _parameter(parameter, getattr(node.node, name), _added(linked, parameter))
-                | {"idle": parameter.unless if node.inputs.get(parameter.unless) else ""}
-                for name, parameter in node.node.parameters().items()
-            },
+            **_types(linked, node, {end.port for end in ends if end.node == node.id}, families),
+            "parameters": {name: _parameter(linked, node, one) for name, one in node.node.parameters().items()},
             "inputs": {
-                name: _input(graph, node.id, name, port)
+                name: _input(node, name, port)
                 for name, port in node.node.inputs().items()
                 if isinstance(port, Input | InOut)
             },
@@ -82,10 +75,12 @@ def _base(node: Value, own: Path | None) -> str:
     return "" if found is None or files & {own, None} else found.stem
 
 
-def _types(linked: Linked, node: GraphNode, read: Set[str], family: Sequence[str]) -> dict[str, list[str]]:
-    """Return the types of a node's family: those that fit its links, and the others."""
+def _types(
+    linked: Linked, node: GraphNode, read: Set[str], families: Mapping[str, Sequence[str]]
+) -> dict[str, list[str]]:
+    """Return the types of a node's family: those that fit its links, of outputs that are `read`, and the others."""
     types: dict[str, list[str]] = {"types": [], "other_types": []}
-    for name in family:
+    for name in families.get(node.type.family, ()):
         try:
             cls = linked.catalog.get(name).cls
         except InputError:  # a plugin that cannot be imported
@@ -96,13 +91,9 @@ def _types(linked: Linked, node: GraphNode, read: Set[str], family: Sequence[str
     return types
 
 
-def _added(linked: Linked, parameter: Parameter) -> tuple[str, ...]:
-    if not parameter.open_name:
-        return ()
-    return tuple(added.name for added in linked.catalog.extensions.choices(parameter.open_name))
-
-
-def _parameter(parameter: Parameter, value: Any, added: tuple[str, ...]) -> dict[str, Any]:
+def _parameter(linked: Linked, node: GraphNode, parameter: Parameter) -> dict[str, Any]:
+    value, extensions = getattr(node.node, parameter.name), linked.catalog.extensions
+    added = tuple(one.name for one in extensions.choices(parameter.open_name)) if parameter.open_name else ()
     choices = [*parameter.choices, *added]
     return {
         "value": value,
@@ -115,6 +106,7 @@ def _parameter(parameter: Parameter, value: Any, added: tuple[str, ...]) -> dict
         "choices": choices,
         "kind": "choice" if choices else "color" if parameter.glsl == "vec3" else _kind(value, parameter.type),
         "takes": parameter.takes(added),
+        "idle": parameter.unless if node.inputs.get(parameter.unless) else "",
     }
 
 
@@ -125,13 +117,12 @@ def _kind(value: Any, annotation: Any = None) -> str:
     return next((name for kind, name in kinds if isinstance(value, kind)), "json")
 
 
-def _input(graph: Graph, node: str, name: str, port: Input | InOut) -> dict[str, Any]:
-    ends = graph[node].inputs.get(name, ())
+def _input(node: GraphNode, name: str, port: Input | InOut) -> dict[str, Any]:
     return {
         "doc": port.doc,
         "kind": port.kind,
         "semantic": getattr(port.semantic, "name", "any"),
         "optional": port.optional,
         "many": getattr(port, "many", False),
-        "links": [str(end) for end in ends],
+        "links": [str(end) for end in node.inputs.get(name, ())],
     }

@@ -126,10 +126,8 @@ def in_place(opened: Selection, selection: Selection, file: Path, text: str) -> 
         InputError: the selection does not link.
         UsageError: (RG500) some of the changes cannot be written into the text.
     """
-    linked = stages.link(stages.resolve(selection))
-    wanted = _without_view(linked, selection)
-    if seen := _view_keys(selection, linked, file.parent):
-        wanted["scene"] = _scene_keys(linked, file.parent) | seen
+    resolved, scene = _resolved(selection, file.parent)
+    wanted = resolved | scene
     pipeline = PipelineText(text, file, Catalog.discover(opened.plugins))
     beside = edited(pipeline, selection.sets, ())
     for setting in settings([f"{path}={value}" for path, value in beside.items()]):
@@ -155,11 +153,9 @@ def variant(opened: Selection, selection: Selection, file: Path) -> str:
     if selection.text is None or own_file(opened) is None:
         with contextlib.suppress(UsageError):  # otherwise changes are written as a difference
             return in_place(opened, selection, file, selection.text or f"rendergraph: 1\nextends: {opened.source}\n")
-    linked = stages.link(stages.resolve(selection))
+    resolved, scene = _resolved(selection, file.parent)
     before = stages.resolve(replace(opened, sets=(), patches=(), scene=None, size=None)).spec.plain()
-    changed = {"extends": opened.source} | diff(before, _without_view(linked, selection))
-    if seen := _view_keys(selection, linked, file.parent):
-        changed["scene"] = _scene_keys(linked, file.parent) | seen
+    changed = {"extends": opened.source} | diff(before, resolved) | scene
     return to_yaml(from_plain(changed, Source("variant")), origins=False)
 
 
@@ -174,11 +170,20 @@ def unlinked(opened: Selection, selection: Selection) -> str:
     return pipeline.text
 
 
-def _without_view(linked: Linked, selection: Selection) -> dict[str, Any]:
-    """Return the resolved file with the scene's own cameras: a camera as text does not change the scene."""
-    if selection.camera is None:
-        return linked.spec.plain()
-    return stages.resolve(replace(selection, camera=None)).spec.plain()
+def _resolved(selection: Selection, folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the resolved file with the scene's own cameras, and what replaces its key `scene` to keep what is shown.
+
+    The latter is empty if a page shows the file's own scene from one of its cameras.
+    """
+    linked = stages.link(stages.resolve(selection))
+    resolved = stages.resolve(replace(selection, camera=None)).spec.plain()
+    if not (keys := _view_keys(selection, linked, folder)):
+        return resolved, {}
+    file, changes = linked.spec.scene, linked.spec.scene_changes
+    scene = dict(changes.plain()) if changes is not None else {}
+    if file is not None:
+        scene["extends"] = file.stem if file in shipped_scenes().values() else os.path.relpath(file, folder)
+    return resolved, {"scene": scene | keys}
 
 
 def _view_keys(chosen: Selection, linked: Linked, folder: Path) -> dict[str, Any]:
@@ -200,15 +205,6 @@ def _view_keys(chosen: Selection, linked: Linked, folder: Path) -> dict[str, Any
     return keys | ({"variant": chosen.variant} if chosen.variant else {})
 
 
-def _scene_keys(linked: Linked, folder: Path) -> dict[str, Any]:
-    """Return the scene of a pipeline as a mapping that a file in a folder may hold."""
-    file, changes = linked.spec.scene, linked.spec.scene_changes
-    keys = dict(changes.plain()) if changes is not None else {}
-    if file is not None:
-        keys["extends"] = file.stem if file in shipped_scenes().values() else os.path.relpath(file, folder)
-    return keys
-
-
 # --- what can be added ------------------------------------------------------------------------------------------------
 
 
@@ -221,15 +217,14 @@ def node_types(catalog: Catalog) -> list[dict[str, Any]]:
         except InputError:  # a plugin's that cannot be imported
             continue
         inputs = entry.cls.inputs()
-        found.append(
-            {
-                "name": name,
-                "family": entry.family,
-                "doc": (entry.cls.__doc__ or "").strip().partition("\n\n")[0].replace("\n", " "),
-                "inputs": {key: _port(port, inputs) | {"optional": port.optional} for key, port in inputs.items()},
-                "outputs": {key: _port(port, inputs) for key, port in entry.cls.outputs().items()},
-            }
-        )
+        facts = {
+            "name": name,
+            "family": entry.family,
+            "doc": (entry.cls.__doc__ or "").strip().partition("\n\n")[0].replace("\n", " "),
+            "inputs": {key: _port(port, inputs) | {"optional": port.optional} for key, port in inputs.items()},
+            "outputs": {key: _port(port, inputs) for key, port in entry.cls.outputs().items()},
+        }
+        found.append(facts)
     return sorted(found, key=lambda entry: str(entry["family"]))
 
 

@@ -1,4 +1,4 @@
-"""The page as one static file, which needs no server."""
+"""Static files that need no server: a page with its contents, and the index of a site of such pages."""
 
 from __future__ import annotations
 
@@ -22,6 +22,17 @@ from rendergraph.viewer.view_state import ViewState
 _IMPORT = re.compile(r'^import (?:(\{[^}]*\}) from )?"\./(\w+)\.js";$', re.MULTILINE)
 _EXPORT = re.compile(r"^export ((?:const|function|async function) ([\w$]+))", re.MULTILINE)
 _LIST = re.compile(r"^export \{ ([\w, ]+) \};$", re.MULTILINE)
+_STYLE = """:root { color-scheme: light dark; --page: #ffffff; --ink: #1f2328; --quiet: #57606a; --line: #d5dae0; }
+@media (prefers-color-scheme: dark) { :root { --page: #12161b; --ink: #e6edf3; --quiet: #9aa4af; --line: #333b45; } }
+body { margin: 0 auto; max-width: 1200px; padding: 16px; background: var(--page); color: var(--ink);
+  font: 15px/1.5 system-ui, "DejaVu Sans", sans-serif; }
+ul { list-style: none; padding: 0; display: grid; gap: 20px;
+  grid-template-columns: repeat(auto-fill, minmax(min(340px, 100%), 1fr)); }
+li { border: 1px solid var(--line); border-radius: 8px; overflow: hidden; }
+img { display: block; width: 100%; height: auto; } a { color: inherit; text-decoration: none; }
+h1 { font-size: 22px; } h2 { font-size: 17px; margin: 10px 12px 2px; } p { margin: 0 12px 10px; }
+.quiet { color: var(--quiet); font-size: 13px; }
+"""
 
 
 class Exported(Struct, frozen=True):
@@ -60,10 +71,8 @@ def _ask(service: RenderService, request: Request) -> Response:
     return response
 
 
-def _message(kind: str, facts: Mapping[str, Any], files: Mapping[str, bytes] | None = None) -> dict[str, Any]:
-    pictures = {
-        name: "data:image/png;base64," + base64.b64encode(data).decode() for name, data in (files or {}).items()
-    }
+def _message(kind: str, facts: Mapping[str, Any], files: Mapping[str, bytes] = {}) -> dict[str, Any]:
+    pictures = {name: f"data:image/png;base64,{base64.b64encode(data).decode()}" for name, data in files.items()}
     return {"kind": kind, "facts": dict(facts), "files": pictures}
 
 
@@ -107,3 +116,33 @@ def _as_function(text: str) -> str:
 def _inline(script: str) -> str:
     """Escape a script's text for HTML, in which `</script` would end the element."""
     return script.replace("</script", "<\\/script")
+
+
+# --- a site ----------------------------------------------------------------------------------------------------------
+
+
+def index(title: str, pages: Mapping[str, Exported], times: Mapping[str, float]) -> str:
+    """Return the index of a site as HTML; each page has its files under its name, as `NAME.html` and `NAME.png`.
+
+    `times` has the milliseconds of a frame, by the name of the page.
+    """
+    cards = "\n".join(_card(name, page, times[name]) for name, page in pages.items())
+    return (
+        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<style>\n{_STYLE}</style>\n</head>\n'
+        f"<body>\n<h1>{escape(title)}</h1>\n<ul>\n{cards}\n</ul>\n</body>\n</html>\n"
+    )
+
+
+def _card(name: str, page: Exported, frame_ms: float) -> str:
+    pipeline, facts, name = page.pipeline, page.facts, escape(name)
+    width, height = facts["size"]
+    memory = pipeline["plan"]["memory"]["allocated_bytes"] / 2**20
+    passes = len({step["node"] for step in pipeline["plan"]["order"]})
+    cost = f"{passes} passes, {frame_ms:.1f} ms, {memory:.1f} MiB at {width}×{height}"
+    software = " (software rasteriser)" if facts["device"]["software"] else ""
+    return (
+        f'<li><a href="{name}.html"><img src="{name}.png" width="{width}" height="{height}" '
+        f'alt="Picture of {name}">\n<h2>{name}</h2>\n'
+        f'<p>{escape(str(pipeline["description"]))}</p>\n<p class="quiet">{cost}{software}</p></a></li>'
+    )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, Union
 
 from msgspec import UNSET, Meta, Struct, UnsetType, ValidationError, convert, json
@@ -14,8 +13,7 @@ from rendergraph.scene.model import Camera
 from rendergraph.session.selection import Selection
 
 
-@dataclass(frozen=True)
-class Look:
+class Look(Struct, frozen=True):
     """How a texture is shown: one channel or all, and the mapping of a range; by default as its semantic suggests."""
 
     channel: str = ""
@@ -24,8 +22,7 @@ class Look:
     high: float | None = None
 
 
-@dataclass(frozen=True)
-class RenderRequest:
+class RenderRequest(Struct, frozen=True):
     """A picture of a pipeline with all edits: an output or tap, from a moved camera or the scene's own.
 
     A still picture has full size, no loss and statistics; others are as fast as possible.
@@ -42,42 +39,35 @@ class RenderRequest:
     known_revision: int = 0
 
 
-@dataclass(frozen=True)
-class ThumbnailRequest:
+class ThumbnailRequest(Struct, frozen=True):
     """A small picture of the first texture of each of these nodes in the last frame; None for every port."""
 
     nodes: frozenset[str] | None = None
 
 
-@dataclass(frozen=True)
-class PixelRequest:
+class PixelRequest(Struct, frozen=True):
     """The values of the shown texture at a position: 0…1 from the left and from the top."""
 
     x: float
     y: float
 
 
-@dataclass(frozen=True)
-class CompareRequest:
+class CompareRequest(Struct, frozen=True):
     selection: Selection
 
 
-@dataclass(frozen=True)
-class ChangedFilesRequest:
+class ChangedFilesRequest(Struct, frozen=True):
     """The input files of the picture that have changed."""
-
-    pass
 
 
 Request = RenderRequest | ThumbnailRequest | PixelRequest | CompareRequest | ChangedFilesRequest
 
 
-@dataclass(frozen=True)
-class Response:
+class Response(Struct, frozen=True):
     """A response: JSON values, encoded pictures, problems with their node; camera and bounding sphere of a picture."""
 
-    facts: dict[str, Any] = field(default_factory=dict)
-    files: Mapping[str, bytes] = field(default_factory=dict)
+    facts: dict[str, Any] = {}
+    files: Mapping[str, bytes] = {}
     problems: tuple[Mapping[str, Any], ...] = ()
     camera: Camera | None = None
     sphere: tuple[tuple[float, float, float], float] | None = None
@@ -218,13 +208,9 @@ OPERATIONS: Mapping[str, tuple[type, ...]] = {
 class ReloadMessage(PageMessage, frozen=True):
     """Reload the file from disk, discarding the changes to it."""
 
-    pass
-
 
 class TypesMessage(PageMessage, frozen=True):
     """Request the node types that can be added."""
-
-    pass
 
 
 class DraftMessage(PageMessage, frozen=True):

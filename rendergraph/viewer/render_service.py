@@ -64,15 +64,13 @@ class _Rendered:
     def info(self) -> OutputInfo:
         return self.frame.info(self.name)
 
-    def display(self) -> npt.NDArray[np.uint8]:
-        return self.displayed()[0]
-
     def displayed(self) -> tuple[npt.NDArray[np.uint8], str]:
         """Return the picture, and the mapping of values to colours, if one was chosen."""
-        look, pixels = self.request.look, _expose(self.pixels, self.info, self.request.exposure)
+        look, pixels, exposure = self.request.look, self.pixels, self.request.exposure
+        if exposure and self.info.semantic in _LIGHT:
+            pixels = pixels * np.float32(2.0**exposure)
         if look == Look():
             return images.viewable_as(pixels, self.info), ""
-        pixels = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
         channel = "RGBA".find(look.channel) if look.channel else -1
         if 0 <= channel < pixels.shape[-1]:
             pixels = pixels[..., channel : channel + 1]
@@ -139,15 +137,15 @@ class RenderService:
             "device": dict(frame.device),
             "still": request.still,
             "warnings": [problem.as_json() for problem in warnings],
+            "revision": self._revision,
         }
         if request.still:
             facts["texture"] = texture_statistics(rendered.pixels, rendered.info)
         if request.known_revision != self._revision:
             facts["pipeline"] = self._described
-        facts["revision"] = self._revision
         return Response(
             facts,
-            {"picture": self._encode(picture, ".png" if request.still else ".jpg")},
+            {"picture": _encode(picture, ".png" if request.still else ".jpg")},
             camera=rendered.drawing.camera,
             sphere=bounding_sphere(rendered.drawing.expanded.linked.scene),
         )
@@ -237,12 +235,10 @@ class RenderService:
             main = "image" if "image" in outputs else next(iter(outputs))
             assert self._planned is not None  # the first picture is still, and so planned
             alias = self._planned.plan.memory.no_reuse_bytes > NO_ALIAS_BYTES
-            shown = port if port in outputs else main
+            asked = {"outputs": (port,)} if port in outputs else {"outputs": (main,), "taps": (port,) if port else ()}
             options = RenderOptions(
-                outputs=(shown,), fps=request.fps, warm_up=False, timed=True, reuse=True, alias=alias, share=True
+                **asked, fps=request.fps, warm_up=False, timed=True, reuse=True, alias=alias, share=True
             )
-            if port and port not in outputs:
-                options = replace(options, taps=(port,))
             _store(self._expanded, key, stages.expand(linked, options))
         return self._expanded[key]
 
@@ -250,11 +246,8 @@ class RenderService:
         factor = 1
         while self._full_ms > self._interactive_ms * factor * factor and factor < MOST_REDUCTION:
             factor *= 2
-        return (
-            selection
-            if factor == 1
-            else replace(selection, size=(max(size[0] // factor, 1), max(size[1] // factor, 1)))
-        )
+        width, height = (max(side // factor, 1) for side in size)
+        return selection if factor == 1 else replace(selection, size=(width, height))
 
     # --- more about the picture --------------------------------------------------------------------------------------
 
@@ -287,10 +280,8 @@ class RenderService:
             self._expanded[key] = stages.expand(self._link(small), options)
         frame = self._draw(self._expanded[key], last).frame
         textures = {port: frame.info(port) for port in ports if frame.info(port).kind != "buffer"}
-        files = {
-            port: self._encode(_subsample(images.viewable_as(frame.arrays[port], info)), ".png")
-            for port, info in textures.items()
-        }
+        pictures = {port: images.viewable_as(frame.arrays[port], info) for port, info in textures.items()}
+        files = {port: _encode(_subsample(picture)) for port, picture in pictures.items()}
         return Response({"revision": self._revision}, files)
 
     def _first_texture(self, node: str, ports: Collection[str]) -> str | None:
@@ -299,9 +290,9 @@ class RenderService:
         graph = self._planned.linked.graph
         if node not in graph:
             return None  # it existed when the page asked
-        outputs = (f"{node}.{name}" for name in graph[node].node.outputs())
-        textures = {str(end) for end, info in graph.textures.items() if isinstance(info.desc, TextureDesc)}
-        return next((port for port in outputs if port in ports and port in textures), None)
+        textures = (end for end, info in graph.textures.items() if isinstance(info.desc, TextureDesc))
+        found = {str(end) for end in textures}.intersection(ports)
+        return next((port for name in graph[node].node.outputs() if (port := f"{node}.{name}") in found), None)
 
     @_answer.register
     def _compare(self, request: messages.CompareRequest) -> Response:
@@ -317,20 +308,17 @@ class RenderService:
             "frame_ms": other.frame.frame_ms["median"],
             "passes": [dict(entry) for entry in other.frame.passes],
         }
-        a, b = last.display(), other.display()
-        files = {"other": self._encode(b, ".png")}
+        (a, _), (b, _) = last.displayed(), other.displayed()
+        files = {"other": _encode(b)}
         if a.shape == b.shape and a.shape[-1] == 3:
             metrics, flip = measure(a, b)
             facts["figures"] = metrics.as_json()
             difference = np.abs(a.astype(np.int16) - b.astype(np.int16)).max(axis=-1).astype(np.float32) / 255
-            files["difference"] = self._encode(images.heat_map(np.clip(difference * 8, 0, 1)), ".png")
-            files["flip"] = self._encode(images.heat_map(flip), ".png")
+            files["difference"] = _encode(images.heat_map(np.clip(difference * 8, 0, 1)))
+            files["flip"] = _encode(images.heat_map(flip))
         return Response(facts, files)
 
-    # --- encoding, and errors ----------------------------------------------------------------------------------------
-
-    def _encode(self, picture: npt.NDArray[np.uint8], ending: str) -> bytes:
-        return images.picture_bytes((Path(f"picture{ending}"), picture, None, "data", False), {})
+    # --- errors ------------------------------------------------------------------------------------------------------
 
     def _node_at(self, problem: Problem, request: Request) -> str | None:
         """Return the node that is declared or set at a problem's place, or whose type comes from that file."""
@@ -365,8 +353,8 @@ def _store(cache: dict[Any, Any], key: Any, value: Any) -> None:
     cache[key] = value
 
 
-def _expose(pixels: Pixels, info: OutputInfo, exposure: float) -> Pixels:
-    return pixels * np.float32(2.0**exposure) if exposure and info.semantic in _LIGHT else pixels
+def _encode(picture: npt.NDArray[np.uint8], ending: str = ".png") -> bytes:
+    return images.picture_bytes((Path(f"picture{ending}"), picture, None, "data", False), {})
 
 
 def _subsample(picture: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
@@ -377,47 +365,41 @@ def _subsample(picture: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
 
 def texel(pixels: Pixels, x: float, y: float) -> dict[str, Any]:
     """Return the values at a position, 0…1 from the left and from the top; layers are arranged in a grid, as shown."""
-    array = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
-    if array.ndim == 3:
-        array = array[np.newaxis]
+    array = pixels if pixels.ndim == 4 else pixels[np.newaxis]
     count, height, width, _ = array.shape
     columns = math.ceil(math.sqrt(count))
     rows = math.ceil(count / columns)
-    column, row = min(int(x * columns * width), columns * width - 1), min(int(y * rows * height), rows * height - 1)
-    layer = row // height * columns + column // width
+    across, down = (min(max(share, 0.0), 1.0) for share in (x, y))
+    row, y_in_layer = divmod(min(int(down * rows * height), rows * height - 1), height)
+    column, x_in_layer = divmod(min(int(across * columns * width), columns * width - 1), width)
+    layer = row * columns + column
     if layer >= count:
         return {}
-    position = [column % width, row % height]
-    return {
-        "at": position,
-        "layer": layer if count > 1 else None,
-        "values": _numbers(array[layer, position[1], position[0]]),
-    }
+    values = _numbers(array[layer, y_in_layer, x_in_layer])
+    return {"at": [x_in_layer, y_in_layer], "layer": layer if count > 1 else None, "values": values}
 
 
 def texture_statistics(pixels: Pixels, info: OutputInfo) -> dict[str, Any]:
     """Return a texture's format, shape, count of NaN and infinite texels, and per channel range, mean and histogram."""
     array = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
     flat = array.reshape(-1, array.shape[-1])
-    statistics: dict[str, Any] = {
+    return {
         "format": info.format,
         "semantic": info.semantic,
         "kind": info.kind,
         "shape": list(array.shape),
         "nan": int(np.isnan(flat).any(axis=-1).sum()),
         "infinite": int(np.isinf(flat).any(axis=-1).sum()),
-        "channels": [],
+        "channels": [_channel_statistics(channel) for channel in flat.T.astype(np.float64)],
     }
-    for channel in range(flat.shape[-1]):
-        values = flat[:, channel].astype(np.float64)
-        values = values[np.isfinite(values)]
-        if not values.size:
-            statistics["channels"].append({"min": None, "max": None, "mean": None, "histogram": [0] * BINS})
-            continue
-        counts, _ = np.histogram(values, bins=BINS)
-        low, high, mean = _numbers((values.min(), values.max(), values.mean()))
-        statistics["channels"].append({"min": low, "max": high, "mean": mean, "histogram": counts.tolist()})
-    return statistics
+
+
+def _channel_statistics(values: npt.NDArray[np.float64]) -> dict[str, Any]:
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return {"min": None, "max": None, "mean": None, "histogram": [0] * BINS}
+    low, high, mean = _numbers((values.min(), values.max(), values.mean()))
+    return {"min": low, "max": high, "mean": mean, "histogram": np.histogram(values, bins=BINS)[0].tolist()}
 
 
 def _numbers(values: Iterable[Any]) -> list[Any]:

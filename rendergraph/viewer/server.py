@@ -16,13 +16,15 @@ import struct
 import threading
 import time
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
 import msgspec
 import uvicorn
+from msgspec.structs import replace
 from starlette.applications import Starlette
+from starlette.datastructures import Headers
 from starlette.requests import Request as HttpRequest
 from starlette.responses import PlainTextResponse
 from starlette.responses import Response as HttpResponse
@@ -90,6 +92,9 @@ class Page:
         self.waiting[kind] = message
         self.changed.set()
 
+    def say(self, kind: str, facts: Mapping[str, Any]) -> None:
+        self.put(kind, _text(kind, facts))
+
     async def send_forever(self) -> None:
         while True:
             await self.changed.wait()
@@ -135,7 +140,7 @@ class Server:
         self._still: RenderRequest | None = None  # the last still picture
         self._judging: asyncio.Task[None] | None = None
         self._last: dict[str, bytes | str] = {}  # by kind, for pages that connect later
-        self._queries: dict[tuple[Page, type], tuple[Request, Callable[[Response], None]]] = {}
+        self._pixels: dict[Page, messages.PixelRequest] = {}  # the last one of each page
         self._socket = _bind(host, port)
         port = self._socket.getsockname()[1]
         token = secrets.token_urlsafe(24)
@@ -205,7 +210,7 @@ class Server:
         page = Page(socket)
         for kind, message in self._last.items():
             page.put(kind, message)
-        page.put("state", _text("state", self._state_facts()))
+        page.say("state", self._state_facts())
         self._pages.add(page)
         sending = asyncio.create_task(page.send_forever())
         try:
@@ -229,37 +234,32 @@ class Server:
             try:
                 self._apply(page, parse_message(text))
             except RendergraphError as error:
-                page.put("refused", _text("refused", {"problems": _problems(error)}))
+                page.say("refused", {"problems": _problems(error)})
             except (msgspec.DecodeError, RecursionError):
                 await page.socket.close(1007, "not a JSON object")
                 return
 
     def _apply(self, page: Page, message: PageMessage) -> None:
         match message:
-            case messages.PixelMessage():
-                request = messages.PixelRequest(_clamp(message.x), _clamp(message.y))
-                self._query(
-                    page,
-                    request,
-                    lambda found: page.put("pixel", _text("pixel", found.facts | {"revision": self._shown})),
-                )
+            case messages.PixelMessage(x, y):
+                self._pixels[page] = messages.PixelRequest(x, y)
+                self._wake.set()
             case messages.DraftMessage(name):
-                text, difference, digest = self._state.draft(name)
-                page.put("draft", _text("draft", {"name": name, "difference": difference, "digest": digest}))
+                _, difference, digest = self._state.draft(name)
+                page.say("draft", {"name": name, "difference": difference, "digest": digest})
             case messages.SaveMessage(name, digest):
-                text = self._state.save(name, digest)
-                page.put("saved", _text("saved", {"path": name, "yaml": text}))
+                page.say("saved", {"path": name, "yaml": self._state.save(name, digest)})
                 self._changed()
             case messages.TypesMessage():
                 catalog = Catalog.discover(self._state.opened.plugins)
-                page.put("types", _text("types", {"types": editing.node_types(catalog)}))
+                page.say("types", {"types": editing.node_types(catalog)})
             case messages.VisibleMessage(nodes):
                 page.visible = frozenset(nodes)
                 if self._still is not None and not page.visible <= self._has_thumbnails:
                     self._details_of = self._still
                     self._wake.set()
             case messages.EditMessage(operations):
-                page.put("notes", _text("notes", {"notes": self._state.edit(operations)}))
+                page.say("notes", {"notes": self._state.edit(operations)})
                 self._changed()
             case _:
                 if isinstance(message, messages.HoldMessage):
@@ -296,12 +296,6 @@ class Server:
         if problems:
             self._show_problems(problems)
 
-    def _query(self, page: Page, request: Request, then: Callable[[Response], None]) -> None:
-        """Request something besides pictures; only the last request of each page and kind counts."""
-        self._queries.pop((page, type(request)), None)
-        self._queries[page, type(request)] = request, then
-        self._wake.set()
-
     def _request_picture(self) -> None:
         self._revision += 1
         self._needs_picture = True
@@ -328,10 +322,10 @@ class Server:
                 self._send_state()  # the edited file may have changed on disk
                 continue
             self._wake.clear()
-            while self._queries:
-                request, then = self._queries.pop(next(iter(self._queries)))
-                if (response := await self._ask(request)) is not None:
-                    then(response)
+            while self._pixels:
+                page = next(iter(self._pixels))
+                if (response := await self._ask(self._pixels.pop(page))) is not None:
+                    page.say("pixel", response.facts | {"revision": self._shown})
             if self._needs_picture:
                 self._needs_picture, self._details_of = False, None
                 await self._render()
@@ -370,8 +364,8 @@ class Server:
             return  # the work loop comes back here
         other = self._state.other
         if other is not None and (response := await self._ask(messages.CompareRequest(other))) is not None:
-            more = {"problems": list(response.problems), "revision": self._shown}
-            self._broadcast("against", dict(response.facts) | more, response.files)
+            more = {"problems": response.problems, "revision": self._shown}
+            self._broadcast("against", response.facts | more, response.files)
         elif other is None and "against" in self._last:
             self._broadcast("against", {}, {})
             del self._last["against"]
@@ -451,10 +445,8 @@ class _Guard:
             await PlainTextResponse("refused\n", 403, headers=_HEADERS)(scope, receive, send)
 
     def _is_allowed(self, scope: Scope) -> bool:
-        headers: dict[str, list[str]] = {}
-        for name, value in scope["headers"]:
-            headers.setdefault(name.decode("latin-1"), []).append(value.decode("latin-1"))
-        host, origin = headers.get("host", []), headers.get("origin", [])
+        headers = Headers(scope=scope)
+        host, origin = headers.getlist("host"), headers.getlist("origin")
         if len(host) != 1 or host[0] not in self._hosts or len(origin) > 1:
             return False
         if not origin:
@@ -481,19 +473,15 @@ def _with_port(host: str, port: int) -> str:
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
-def _clamp(value: float) -> float:
-    return min(max(value, 0.0), 1.0)
-
-
 def _problems(error: RendergraphError) -> list[dict[str, Any]]:
     return [problem.as_json() | {"node": None} for problem in error.problems]
 
 
 def _text(kind: str, facts: Mapping[str, Any]) -> str:
-    return json.dumps(jsonable({"kind": kind} | dict(facts)), allow_nan=False, default=str)
+    return json.dumps(jsonable({"kind": kind, **facts}), allow_nan=False, default=str)
 
 
 def _pack(kind: str, facts: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
     """Return the length of the JSON in four bytes, the JSON with each file's length, then the files."""
-    head = _text(kind, dict(facts) | {"files": {name: len(data) for name, data in files.items()}}).encode()
+    head = _text(kind, {**facts, "files": {name: len(data) for name, data in files.items()}}).encode()
     return struct.pack("<I", len(head)) + head + b"".join(files.values())

@@ -11,11 +11,12 @@ import itertools
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from msgspec import UNSET, structs
+from msgspec import UNSET, Struct
+from msgspec.structs import asdict, replace
 
 from rendergraph.catalog import Catalog
 from rendergraph.edit import PipelineText
@@ -42,13 +43,10 @@ FRAME = "frame"
 _FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.ya?ml")
 _BARE = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")  # a word that needs no quotes in YAML
 _KEYWORDS = frozenset({"null", "true", "false", "Null", "NULL", "True", "TRUE", "False", "FALSE"})
-
-
 _State = tuple[str | None, Mapping[str, str]]
 
 
-@dataclass(frozen=True)
-class Edits:
+class Edits(Struct, frozen=True):
     """The changes, with undo and redo.
 
     Attributes:
@@ -56,7 +54,7 @@ class Edits:
         text: the file after changes of its graph; None stands for the file on disk.
     """
 
-    current: Mapping[str, str] = field(default_factory=dict)
+    current: Mapping[str, str] = {}
     text: str | None = None
     before: tuple[_State, ...] = ()
     after: tuple[_State, ...] = ()
@@ -85,12 +83,10 @@ class Edits:
         if not self.before:
             return False
         text, before = self.before[-1]
-        others = ({p: v for p, v in states.items() if p != path} for states in (before, self.current))
-        return text == self.text and next(others) == next(others)
+        return text == self.text and _without(before, path) == _without(self.current, path)
 
     def drop(self, path: str) -> Edits:
-        left = {p: v for p, v in self.current.items() if p != path}
-        return self.write(self.text, left) if path in self.current else self
+        return self.write(self.text, _without(self.current, path)) if path in self.current else self
 
     def write(self, text: str | None, current: Mapping[str, str]) -> Edits:
         """Change the text, and the settings beside it."""
@@ -160,8 +156,8 @@ class ViewState:
     def selection(self) -> Selection:
         """The pipeline with all edits, including a moved camera."""
         if self.edits.text is None:
-            return structs.replace(self.opened, sets=(*self.opened.sets, *self.edits.sets))
-        return structs.replace(self.opened, source=shown_file(self.file), text=self.edits.text, sets=self.edits.sets)
+            return replace(self.opened, sets=(*self.opened.sets, *self.edits.sets))
+        return replace(self.opened, source=shown_file(self.file), text=self.edits.text, sets=self.edits.sets)
 
     @property
     def file(self) -> Path:
@@ -217,7 +213,7 @@ class ViewState:
             "playing": self.playing,
             "port": self.port,
             "exposure_ev": self.exposure,
-            "look": vars(self.look),
+            "look": asdict(self.look),
             "camera": self.selection.camera,
             "moved": self.camera is not None or "=" in (self.selection.camera or ""),
             "others": list(self._others),
@@ -304,10 +300,8 @@ class ViewState:
         if self._own is not None and name == self._own.name:
             return self._own
         if not isinstance(name, str) or not _FILE.fullmatch(name):
-            text = (
-                "variants are saved in the folder where `view` was started; expected a plain name, as in variant.yaml"
-            )
-            raise UsageError(Problem("RG500", text))
+            text = "variants are saved in the folder where `view` was started; expected a plain name"
+            raise UsageError(Problem("RG500", f"{text}, as in variant.yaml"))
         path = self.folder / name
         if path not in self._written and (path.exists() or path.is_symlink()):
             raise UsageError(Problem("RG531", f"'{name}' exists; choose another name"))
@@ -334,10 +328,10 @@ class ViewState:
             case messages.LookMessage(port, exposure):
                 self.port = self.port if port is None else port
                 self.exposure = self.exposure if exposure is None else min(max(exposure, -24.0), 24.0)
-                chosen = {name: getattr(message, name) for name in ("channel", "scale", "low", "high")}
-                changed = {
-                    k: v for k, v in chosen.items() if v is not UNSET and (v is not None or k in ("low", "high"))
-                }
+                words = {"channel": message.channel, "scale": message.scale}
+                limits = {"low": message.low, "high": message.high}
+                changed: dict[str, Any] = {key: word for key, word in words.items() if word is not None}
+                changed |= {key: limit for key, limit in limits.items() if limit is not UNSET}
                 self.look = replace(self.look, **changed)
             case messages.FrameMessage(number):
                 self.frame = min(max(number, 1), MOST_FRAMES)
@@ -367,7 +361,7 @@ class ViewState:
                 if selection is None and name not in shipped_pipelines():
                     text = "compare with a shipped pipeline, a snapshot, or the pipeline of --against"
                     raise UsageError(Problem("RG500", text))
-                shipped = structs.replace(self.opened, source=name, sets=(), patches=())
+                shipped = replace(self.opened, source=name, sets=(), patches=())
                 self._compare_with(name, selection or shipped)
         return True
 
@@ -378,14 +372,12 @@ class ViewState:
 
     def _keep_frame(self) -> None:
         """Make the frame an edit; consecutive changes are one undo step."""
-        if self.frame == int(self.edits.current.get(FRAME, 1)):
-            return
-        again = self.edits.differs_by(FRAME)
-        self.edits = self.edits.set(FRAME, self.frame, again=again)
+        if self.frame != int(self.edits.current.get(FRAME, 1)):
+            self.edits = self.edits.set(FRAME, self.frame, again=self.edits.differs_by(FRAME))
 
     def _look_through(self, name: str) -> None:
         chosen = stages.view_of(stages.resolve(self.selection).spec, name)
-        others = {path: value for path, value in self.edits.current.items() if path not in (CAMERA, FRAME, ENVIRONMENT)}
+        others = _without(self.edits.current, CAMERA, FRAME, ENVIRONMENT)
         self.camera, self.frame = None, int(chosen.get("frame", 1))
         self.edits = self.edits.write(self.edits.text, others | {path: str(value) for path, value in chosen.items()})
 
@@ -415,6 +407,10 @@ class ViewState:
             del self._others[list(self._others)[1]]  # the first is the file as it was opened
         self._others[name] = selection
         self._other = name
+
+
+def _without(settings: Mapping[str, str], *paths: str) -> dict[str, str]:
+    return {path: value for path, value in settings.items() if path not in paths}
 
 
 def _read(path: Path) -> str:

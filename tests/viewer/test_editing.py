@@ -13,9 +13,8 @@ import pytest
 import rendergraph as rg
 from rendergraph.errors import RendergraphError, UsageError
 from rendergraph.images import read
-from rendergraph.viewer import editing, messages
+from rendergraph.viewer import Viewer, editing, messages
 from rendergraph.viewer.messages import RenderRequest, parse_message
-from rendergraph.viewer.notebook import Viewer
 from rendergraph.viewer.render_service import RenderService
 from rendergraph.viewer.view_state import ViewState
 

@@ -239,7 +239,7 @@ def test_a_value_that_slides_is_drawn_as_if_it_were_linked(
         answer = service.answer(RenderRequest(each, still=False))
         assert not answer.problems
         assert service._rendered is not None
-        seen.append(service._rendered.display()[..., :3])
+        seen.append(service._rendered.displayed()[0][..., :3])
     for found, expected in zip(seen, (still[1], still[2], still[0], still[1]), strict=True):
         np.testing.assert_array_equal(found, expected[..., :3])
     np.testing.assert_array_equal(picture(service.answer(RenderRequest(chosen[0])), tmp_path), still[1])
