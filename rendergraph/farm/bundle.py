@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from msgspec.structs import replace
 
 from rendergraph.catalog.find import OWN, VARIABLE, configured
-from rendergraph.errors import InputError, Place, Problem, RendergraphError
+from rendergraph.errors import InputError, Problem, RendergraphError
 from rendergraph.installed import version
 from rendergraph.resources import folder
 
@@ -73,9 +73,8 @@ def make_bundle(read: Iterable[str], plugins: Sequence[Path], modules: Iterable[
         found |= set(_files_of(Path(os.path.abspath(plugin))))
     if len(found) > MOST_FILES or sum(path.stat().st_size for path in found) > MOST_BYTES:
         limits = f"{MOST_FILES} files or {MOST_BYTES >> 30} GiB"
-        raise InputError(
-            Problem("RG642", f"the work needs {len(found)} files, more than {limits}; share a disk instead")
-        )
+        text = f"the work needs {len(found)} files, more than {limits}; share a disk instead"
+        raise InputError(Problem("RG642", text))
     packages = (OWN, *sorted(_distributions(modules) - {OWN}))
     return Bundle(
         {str(path): file_sha256(path) for path in sorted(found)},
@@ -101,9 +100,7 @@ def file_sha256(path: Path) -> str:
 
 def _distributions(modules: Iterable[str]) -> set[str]:
     packages = {module.partition(".")[0] for module in modules} - {OWN}
-    if not packages:
-        return set()
-    distributions = metadata.packages_distributions()
+    distributions = metadata.packages_distributions() if packages else {}
     return {name for package in packages for name in distributions.get(package, ())}
 
 
@@ -111,8 +108,7 @@ def digest_of(name: str) -> str:
     """Return the SHA-256 of a distribution's source files; two builds of one version may differ."""
     digest = hashlib.sha256()
     for path in sorted(_sources(name)):
-        digest.update(path.name.encode())
-        digest.update(bytes.fromhex(file_sha256(path)))
+        digest.update(path.name.encode() + bytes.fromhex(file_sha256(path)))
     return digest.hexdigest()
 
 
@@ -182,7 +178,7 @@ def map_remote_paths(error: RendergraphError, root: Path | None) -> RendergraphE
         place = problem.place
         if place is None or not Path(place.file).is_relative_to(root):
             return problem
-        home = Place(f"/{Path(place.file).relative_to(root)}", place.line, place.column)
+        home = replace(place, origin=f"/{Path(place.file).relative_to(root)}")
         return problem.relocate(home, problem.line_text)
 
     return error.relocated(mapped)

@@ -22,7 +22,7 @@ from distributed import WorkerPlugin, get_worker
 
 from rendergraph.errors import InputError, Problem, RenderError, RendergraphError, UsageError
 from rendergraph.farm.bundle import Bundle, check_packages, make_bundle
-from rendergraph.farm.tasks import Event, Executor, Handle, Task, TaskFailed, TaskFinished, TaskOutput, is_retryable
+from rendergraph.farm.tasks import Event, Executor, Handle, Task
 from rendergraph.farm.worker_process import WorkerProcess
 from rendergraph.installed import version
 
@@ -110,7 +110,6 @@ class Dask(Executor):
         self._setup = f"rendergraph-{uuid4().hex[:12]}"
         self._bundle: Bundle | None = None
         self._paths: dict[str, Path] = {}
-        self._values: dict[str, bytes] = {}
         self._uploaded: dict[str, Future] = {}
         self._uploads = 0
         self._done: queue.SimpleQueue[Future] = queue.SimpleQueue()
@@ -130,13 +129,10 @@ class Dask(Executor):
                 errors = self._client.run(setup_error, self._setup, on_error="return")
             except (ImportError, AttributeError, RuntimeError, OSError) as error:
                 raise self._unusable(str(error)) from error
-            problems = []
-            for worker, found in errors.items():
-                if found is not None:
-                    known = found if isinstance(found, InputError) else self._unusable(f"{worker}: {found}")
-                    problems += list(known.problems)
-            if problems:
-                raise InputError(problems)
+            found = {worker: error for worker, error in errors.items() if error is not None}
+            if found:
+                known = (e if isinstance(e, InputError) else self._unusable(f"{w}: {e}") for w, e in found.items())
+                raise InputError([problem for error in known for problem in error.problems])
         self._bundle = bundle
 
     @staticmethod
@@ -172,27 +168,22 @@ class Dask(Executor):
         self._upload(contents)
 
     def put(self, value: Any) -> Handle:
-        data = pickle.dumps(value, protocol=pickle.HIGHEST_PROTOCOL)
-        handle = Handle(hashlib.sha256(data).hexdigest())
-        if handle.digest not in self._values:
-            self._upload({handle.digest: data})
-            self._values[handle.digest] = data
+        handle = super().put(value)
+        if handle.digest not in self._uploaded:
+            self._upload({handle.digest: self._values[handle.digest]})
         return handle
 
     def submit(self, task: Task) -> None:
         if self._bundle is None:
             self.upload_inputs(lambda: make_bundle((), ()))
         assert self._bundle is not None
-        digests = sorted(set(self._bundle.files.values()))
-        needs = [handle.digest for handle in task.needs]
         future = self._client.submit(
             run_task,
             self._setup,
             pickle.dumps(task, protocol=pickle.HIGHEST_PROTOCOL),
-            needs,
+            {handle.digest: self._uploaded[handle.digest] for handle in task.needs},
             self._bundle,
-            digests,
-            *(self._uploaded[digest] for digest in (*digests, *needs)),
+            {digest: self._uploaded[digest] for digest in self._bundle.files.values()},
             key=f"{self._setup}-{uuid4().hex}",
             pure=False,
             retries=0,
@@ -247,15 +238,7 @@ class Dask(Executor):
             yield self.retry(task, "cluster", RenderError(Problem("RG640", text)))
             return
         worker, messages = answer
-        for kind, value in messages:
-            if kind == "item":
-                yield TaskOutput(task, value, worker)
-            elif kind == "finished":
-                yield TaskFinished(task, worker, value)
-            elif kind == "lost" or is_retryable(value):
-                yield self.retry(task, worker, value)
-            else:
-                yield TaskFailed(task, worker, value)
+        yield from (self.event(task, worker, kind, value) for kind, value in messages)
 
     def close(self) -> None:
         """Leave the cluster and end our tasks there; a cluster that was started here ends, too."""
@@ -336,12 +319,10 @@ class WorkerSetup(WorkerPlugin):
 
 
 def run_task(
-    setup: str, task: bytes, needs: Sequence[str], bundle: Bundle, digests: Sequence[str], *contents: bytes
+    setup: str, task: bytes, values: Mapping[str, bytes], bundle: Bundle, files: Mapping[str, bytes]
 ) -> tuple[str, list[tuple[str, Any]]]:
-    """Run one of our tasks as a Dask task; `contents` are the files' by digest, then the values that the task needs."""
+    """Run one of our tasks as a Dask task, with the values that it needs and the contents of files, by digest."""
     worker: Any = get_worker()
-    files = dict(zip(digests, contents[: len(digests)], strict=True))
-    values = dict(zip(needs, contents[len(digests) :], strict=True))
     return str(worker.address), worker.plugins[setup].run(task, values, bundle, files)
 
 

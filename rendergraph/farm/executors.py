@@ -1,17 +1,21 @@
-"""Choose an executor: by a name on the command line, by an object from Python, or by the size of the work."""
+"""Executors: several processes on this machine, and the choice among all.
+
+An executor is chosen by a name on the command line, by an object from Python, or by the size of the work.
+"""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from multiprocessing.connection import wait
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from rendergraph.errors import Problem, UsageError
-from rendergraph.farm.processes import Processes
-from rendergraph.farm.tasks import Executor, Serial
-from rendergraph.farm.worker_process import TIMEOUT
+from rendergraph.errors import DeviceError, Problem, RenderError, UsageError
+from rendergraph.farm.tasks import Event, Executor, Serial, Task, is_retryable
+from rendergraph.farm.worker_process import TIMEOUT, WorkerProcess
 from rendergraph.installed import require
 
 if TYPE_CHECKING:
@@ -24,6 +28,75 @@ ENOUGH_CORES = 4
 _NAMES = "serial, processes, processes:N, dask, dask:N, dask://HOST:PORT"
 _NAME = re.compile(r"serial|(processes|dask)(?::([1-9][0-9]{0,3}))?|dask://[^\s/]+:[0-9]{1,5}")
 _MOST_WORKERS = 1024
+
+
+class Processes(Executor):
+    """Processes on this machine, which read files in place."""
+
+    def __init__(self, count: int, devices: Sequence[int | None] = (None,), *, timeout: float = TIMEOUT) -> None:
+        """Describe the processes, which are started for tasks; they get the devices in turns."""
+        super().__init__()
+        self.workers = count
+        self._idle = [
+            WorkerProcess(f"process-{number}", devices[number % len(devices)], timeout=timeout)
+            for number in range(count)
+        ]
+        self._busy: dict[WorkerProcess, Task] = {}
+        self._waiting: deque[Task] = deque()
+        threads = str(max(1, (os.cpu_count() or 1) // count))  # else each software rasteriser takes all cores
+        self._environment = {"LP_NUM_THREADS": os.environ.get("LP_NUM_THREADS", threads)}
+
+    def submit(self, task: Task) -> None:
+        self._waiting.append(task)
+
+    @property
+    def busy_pids(self) -> list[int]:
+        return [worker.child.process.pid for worker in self._busy if worker.child is not None]
+
+    def events(self) -> Iterator[Event]:
+        while self._waiting or self._busy:
+            while self._waiting and self._idle:
+                yield from self._send(self._idle.pop(0), self._waiting.popleft())
+            pipes: dict[Any, WorkerProcess] = {w.child.pipe: w for w in self._busy if w.child is not None}
+            if not pipes:
+                continue
+            ready = wait(list(pipes), min(worker.seconds_left for worker in pipes.values()))
+            for pipe, worker in pipes.items():
+                if pipe in ready or worker.seconds_left == 0.0:
+                    yield from self._receive(worker)
+
+    def _send(self, worker: WorkerProcess, task: Task) -> Iterator[Event]:
+        self._busy[worker] = task
+        try:
+            worker.send(task, {each.digest: self._values[each.digest] for each in task.needs}, self._environment)
+        except RenderError as error:
+            yield self.retry(self._free(worker), worker.name, error)
+
+    def _receive(self, worker: WorkerProcess) -> Iterator[Event]:
+        try:
+            kind, value = worker.receive()
+        except RenderError as error:
+            kind, value = "lost", error
+        except DeviceError as error:  # the others go on without it
+            self._waiting.appendleft(self._busy.pop(worker))
+            if not self._busy and not self._idle:
+                raise error
+            return
+        if kind == "failed" and is_retryable(value):
+            worker.kill()  # it cannot be used any more
+        if kind != "ready":
+            task = self._busy[worker] if kind == "item" else self._free(worker)
+            yield self.event(task, worker.name, kind, value)
+
+    def _free(self, worker: WorkerProcess) -> Task:
+        self._idle.append(worker)
+        return self._busy.pop(worker)
+
+    def close(self) -> None:
+        self._waiting.clear()
+        for worker in (*self._idle, *self._busy):
+            worker.kill()
+        self._busy.clear()
 
 
 def make_executor(

@@ -18,7 +18,6 @@ from rendergraph.session import stages
 from rendergraph.session.pipeline import Pipeline
 
 if TYPE_CHECKING:
-    from rendergraph.errors import RendergraphError
     from rendergraph.session.frame import Frame
     from rendergraph.session.selection import RenderOptions, Selection
     from rendergraph.session.values import Expanded
@@ -66,9 +65,8 @@ class FrameChunk(Task):
         expanded = stages.expand(pipeline.link(), self.options)
         frame = suspect = None
         for frame in stages.draw(expanded, worker.gpu, lead=self.lead):
-            files = tuple(_encode(frame, file) for file in self.files)
             suspect = suspect or (frame if frame.unsound else None)
-            yield RenderedFrame(frame.number, files)
+            yield RenderedFrame(frame.number, tuple(_encode(frame, file) for file in self.files))
         assert frame is not None  # a chunk has one at least
         warnings = stages.not_finite_warnings(suspect, expanded, worker.gpu) if suspect else ()
         figures = {name: array for name, array in frame.arrays.items() if array.shape[:-1] == (1, 1)}
@@ -91,11 +89,11 @@ def split_frames(expanded: Expanded, files: Sequence[FrameFile], workers: int, w
         text += "state how many earlier frames matter (warm_up: 16), or use --executor serial"
         raise InputError(Problem("RG643", text, Place(expanded.linked.graph.name)))
     lead = warm_up if histories and warm_up is not None else 1  # even without a history, motion needs one
-    frames = expanded.options.frames
+    options, selection = expanded.options, expanded.linked.selection
+    frames = options.frames
     each = max(1, min(LONGEST_CHUNK, -(-len(frames) // (CHUNKS_PER_WORKER * workers))), 2 * lead if histories else 1)
-    parts = [frames[at : at + each] for at in range(0, len(frames), each)]
-    options = [structs.replace(expanded.options, frames=part) for part in parts]
-    return [FrameChunk(expanded.linked.selection, own, lead, tuple(files)) for own in options]
+    parts = (frames[at : at + each] for at in range(0, len(frames), each))
+    return [FrameChunk(selection, structs.replace(options, frames=part), lead, tuple(files)) for part in parts]
 
 
 def render_chunks(executor: Executor, chunks: Sequence[FrameChunk]) -> Iterator[RenderedFrame | Frame]:
@@ -105,8 +103,7 @@ def render_chunks(executor: Executor, chunks: Sequence[FrameChunk]) -> Iterator[
         executor.submit(chunk)
     for event in executor.events():
         if isinstance(event, TaskFailed):
-            error: RendergraphError = event.error
-            raise type(error)(error.problems) from error
+            raise type(event.error)(event.error.problems) from event.error
         if isinstance(event, TaskOutput):
             if isinstance(event.value, RenderedFrame):
                 if event.value.number in seen:  # from a worker that was lost afterwards

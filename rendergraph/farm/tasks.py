@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import pickle
 import time
 from abc import ABC, abstractmethod
 from collections import Counter, deque
@@ -10,6 +12,8 @@ from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeAlias
+
+from msgspec import Struct
 
 from rendergraph.errors import DeviceError, InputError, Problem, RenderError, RendergraphError
 
@@ -75,35 +79,28 @@ class Worker:
         self._stack.close()
 
 
-@dataclass(frozen=True, eq=False)
-class TaskOutput:
+class _TaskEvent(Struct, frozen=True, eq=False):
     task: Task
+    worker: str
+
+
+class TaskOutput(_TaskEvent, frozen=True, eq=False):
     value: Any
-    worker: str
 
 
-@dataclass(frozen=True, eq=False)
-class TaskFinished:
-    task: Task
-    worker: str
+class TaskFinished(_TaskEvent, frozen=True, eq=False):
     seconds: float
 
 
-@dataclass(frozen=True, eq=False)
-class TaskRetried:
+class TaskRetried(_TaskEvent, frozen=True, eq=False):
     """A worker was lost during a task, or failed for reasons of its own; another one begins the task again."""
 
-    task: Task
-    worker: str
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class TaskFailed:
+class TaskFailed(_TaskEvent, frozen=True, eq=False):
     """A task will not be completed: it has failed itself, or is `lost` because too many workers were lost with it."""
 
-    task: Task
-    worker: str
     error: RendergraphError
     lost: bool = False
 
@@ -122,11 +119,11 @@ class Executor(AbstractContextManager["Executor"], ABC):
 
     def __init__(self) -> None:
         self._losses: Counter[tuple[Task, bool]] = Counter()
+        self._values: dict[str, bytes] = {}  # pickled, by digest
 
     @abstractmethod
     def submit(self, task: Task) -> None:
         """Add a task; also while events are taken."""
-        pass
 
     @abstractmethod
     def events(self) -> Iterator[Event]:
@@ -139,12 +136,27 @@ class Executor(AbstractContextManager["Executor"], ABC):
     def close(self) -> None:
         """End all running tasks."""
 
-    @abstractmethod
     def put(self, value: Any) -> Handle:
         """Make a value available to tasks; it can be pickled, and each worker gets it once."""
+        data = pickle.dumps(value, protocol=pickle.HIGHEST_PROTOCOL)
+        digest = hashlib.sha256(data).hexdigest()
+        self._values[digest] = data
+        return Handle(digest)
 
     def upload_inputs(self, make: Callable[[], Bundle]) -> None:
         """Send the input files to workers that do not share a disk with this process, and check their packages."""
+
+    def event(self, task: Task, worker: str, kind: str, value: Any) -> Event:
+        """Return the event of a message from a worker's process; `lost` says that the process has ended."""
+        if kind == "item":
+            return TaskOutput(task, worker, value)
+        if kind == "finished":
+            return TaskFinished(task, worker, value)
+        return (
+            self.retry(task, worker, value)
+            if kind == "lost" or is_retryable(value)
+            else TaskFailed(task, worker, value)
+        )
 
     def retry(self, task: Task, worker: str, error: RendergraphError, *, inputs_lost: bool = False) -> Event:
         """Submit a task again whose worker was lost, unless that happened too often; its inputs may be lost, too."""
@@ -188,7 +200,7 @@ class Serial(Executor):
             task, begun = self._waiting.popleft(), time.monotonic()
             try:
                 for value in task.run(self._worker):
-                    yield TaskOutput(task, value, self._worker.name)
+                    yield TaskOutput(task, self._worker.name, value)
             except (InputError, RenderError) as error:
                 yield TaskFailed(task, self._worker.name, error)
             else:

@@ -63,7 +63,7 @@ class Metered(Serial):
                 spent += process_time() - begun
                 if value is None:
                     break
-                yield TaskOutput(task, value, "elsewhere")
+                yield TaskOutput(task, "elsewhere", value)
             self.costs.setdefault(len(task.runs), []).append(spent)
             yield TaskFinished(task, "elsewhere", spent)
 

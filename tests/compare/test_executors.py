@@ -24,7 +24,7 @@ from rendergraph.compare.engine import Sweep, compare, sweep
 from rendergraph.compare.store import RESULTS, ResultsLog
 from rendergraph.errors import InputError, RenderError, UsageError
 from rendergraph.farm import dask_cluster
-from rendergraph.farm.processes import Processes
+from rendergraph.farm.executors import Processes
 
 distributed: Any = pytest.importorskip("distributed")
 pytestmark = pytest.mark.slow  # they start processes

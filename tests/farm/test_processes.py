@@ -15,8 +15,7 @@ import pytest
 
 from rendergraph.errors import DeviceError, UsageError
 from rendergraph.farm import Serial, TaskFailed, TaskFinished, TaskOutput, TaskRetried, worker_process
-from rendergraph.farm.executors import make_executor
-from rendergraph.farm.processes import Processes
+from rendergraph.farm.executors import Processes, make_executor
 
 Chores = Callable[..., Any]
 
@@ -85,7 +84,7 @@ def test_processes_without_a_device_say_so(chore: Chores) -> None:
 CLIENT = """
 import signal
 from chores import Chore
-from rendergraph.farm.processes import Processes
+from rendergraph.farm.executors import Processes
 signal.signal(signal.SIGINT, signal.default_int_handler)  # which whoever runs the tests in the background ignores
 with Processes(2) as farm:
     for number in range(2):
