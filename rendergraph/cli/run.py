@@ -120,8 +120,8 @@ def command(
     """
     from rendergraph.images.video import is_film
     from rendergraph.session import RenderOptions
-    from rendergraph.session.films import film_frames
     from rendergraph.session.gpu import Gpu
+    from rendergraph.session.motion import film_frames
 
     def render_options(linked: Linked) -> RenderOptions:
         number, rate = linked.frames, fps or linked.fps
@@ -175,7 +175,7 @@ def _read(
     from rendergraph.images.saving import extension
     from rendergraph.images.video import ENDINGS, is_film
     from rendergraph.session import stages
-    from rendergraph.session.films import standstill_warning
+    from rendergraph.session.motion import standstill_warning
     from rendergraph.session.outputs import every_port, figures
 
     with track_reads() as files:

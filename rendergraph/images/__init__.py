@@ -9,6 +9,7 @@ from rendergraph.images.encode import EXTENSIONS, picture_bytes, write
 from rendergraph.images.saving import (
     PictureInfo,
     Saved,
+    Shown,
     channel_names,
     check_target,
     encoded,
@@ -17,8 +18,8 @@ from rendergraph.images.saving import (
     output_for,
     save_output,
     save_outputs,
+    shown,
     stands_for,
     viewable_as,
 )
-from rendergraph.images.shown import Shown, shown
 from rendergraph.images.viewable import from_srgb, heat_map, mapped, signed_map, to_srgb, viewable

@@ -32,7 +32,7 @@ from rendergraph.scene.animate import complete, on_turntable
 from rendergraph.scene.facts import camera_facts, environment_facts, light_facts, material_facts, object_facts
 from rendergraph.scene.model import Scene
 from rendergraph.scene.scene_data import scene_data_facts
-from rendergraph.session import driven
+from rendergraph.session import motion
 from rendergraph.session.outputs import every_port, requested_outputs
 from rendergraph.session.picture_metadata import ENVIRONMENT_NAMES, is_picture, read_picture_metadata
 from rendergraph.session.scenes import scene_of
@@ -151,7 +151,7 @@ def link(resolved: Resolved) -> Linked:
         camera_facts(scene),
     )
     if scene.node_curves:
-        graph = replace(graph, warnings=(*graph.warnings, *driven.checked(graph, scene)))
+        graph = replace(graph, warnings=(*graph.warnings, *motion.check_keyframes(graph, scene)))
     return Linked(**asdict(resolved), scene=scene, graph=graph)
 
 
