@@ -41,13 +41,9 @@ def format_value(value: Any) -> str:
 def table(
     rows: Sequence[Sequence[object]], heads: Sequence[str] = (), *, right: Sequence[int] = (), width: int = 1 << 20
 ) -> str:
-    """Return aligned columns, two spaces between them.
+    """Return aligned columns, two spaces between them; rows may have fewer cells than others, and None is empty.
 
-    Args:
-        rows: cells; None is empty. A row may have fewer than others.
-        heads: titles of the columns.
-        right: numbers of the columns that are aligned to the right.
-        width: width of the table in characters; the last column is wrapped to fit.
+    The columns whose numbers are in `right` are aligned to the right; the last column is wrapped to fit the width.
     """
     cells = [["" if cell is None else str(cell) for cell in row] for row in [heads, *rows] if row]
     widths = [max(map(len, column)) for column in zip_longest(*cells, fillvalue="")]

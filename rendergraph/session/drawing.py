@@ -96,10 +96,6 @@ class Drawing(Struct, eq=False, dict=True):
         If frames depend on earlier ones, missing earlier frames are rendered first, so that a frame does not depend on
         which others are requested. With a camera of the caller's, rendering continues from the last frame instead.
 
-        Args:
-            number: of the frame.
-            camera: by default the selected one, as it is at that time.
-
         Raises:
             RenderError: the driver reported an error, an `update` failed, or something else was rendered meanwhile.
         """

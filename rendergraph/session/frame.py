@@ -43,12 +43,7 @@ class OutputInfo(Struct, frozen=True):
 
 
 def not_finite(pixels: npt.NDArray[Any], semantic: str) -> int:
-    """Return the number of pixels that hold NaN or infinity; a depth may be infinite, where there is no surface.
-
-    Args:
-        pixels: (…, channels), as read back; whole numbers are finite.
-        semantic: of the texels.
-    """
+    """Return how many of (…, channels) pixels hold NaN or infinity; a depth is infinite where there is no surface."""
     import numpy as np  # a session is imported without it
 
     if pixels.dtype.kind != "f":

@@ -70,9 +70,8 @@ class Gpu:
             self._closed = True
             return
         if threading.get_ident() != self._thread:
-            raise RenderError(
-                Problem("RG615", "a session must be closed by the thread that created it; render and close it there")
-            )
+            text = "a session must be closed by the thread that created it; render and close it there"
+            raise RenderError(Problem("RG615", text))
         self._closed = True
         with self.device.current():
             self.device.raw.glUseProgram(0)  # one in use would outlive its deletion
@@ -81,11 +80,7 @@ class Gpu:
 
     @contextmanager
     def current(self) -> Iterator[None]:
-        """Make the context current, in which everything is compiled and rendered, and restore the previous one.
-
-        Raises:
-            RenderError: it is closed, belongs to another thread or process, or its borrowed context has been released.
-        """
+        """Make the context current, in which everything is compiled and rendered, and restore the previous one."""
         text = ""
         if self._closed:
             text = "the session is closed; render before its `with` block ends, or create another"

@@ -42,27 +42,19 @@ class _Entry(Struct, eq=False):
 
 
 class GpuCache:
-    """One scene, and everything that a session caches within limits, where the least recently used is freed first.
-
-    Attributes:
-        kept: values that kept steps have computed.
-        scenes_made: number of scenes that have been uploaded so far.
-        image_warnings: about the images of the current scene.
-        active: the last compiled or found executable.
-        drawing: the drawing that may render; all earlier ones are invalid.
-    """
+    """One scene, and everything that a session caches within limits, where the least recently used is freed first."""
 
     def __init__(self, device: Device, limits: CacheLimits) -> None:
         self._device = device
         self.limits = limits
         self.programs = ProgramCache(device, limits.programs)
-        self.kept = KeptValues(device, limits.bytes // 16)
+        self.kept = KeptValues(device, limits.bytes // 16)  # values that kept steps have computed
         self._pool = TexturePool(device)
         self._generator = TextureGenerator(self.programs)
-        self.scenes_made = 0
-        self.image_warnings: list[Problem] = []
-        self.active: Executable | None = None
-        self.drawing: object = None
+        self.scenes_made = 0  # number of scenes that have been uploaded so far
+        self.image_warnings: list[Problem] = []  # of the current scene
+        self.active: Executable | None = None  # the last one that was compiled or found
+        self.drawing: object = None  # the one that may render; all earlier ones are invalid
         self._entries: dict[Hashable, _Entry] = {}  # least recently used first
         self._scene: tuple[Scene, GpuScene] | None = None
 

@@ -27,11 +27,7 @@ def film_frames(
     *,
     turntable: bool = False,
 ) -> range:
-    """Return the frames of a film: those given, as many as `seconds` take, or the scene's motion once.
-
-    Raises:
-        UsageError: a value is impossible, both are given, or `clip` for a scene in which nothing moves.
-    """
+    """Return the frames of a film: those given, as many as `seconds` take, or the scene's motion once."""
     if frames is not None and seconds is not None:
         raise UsageError(Problem("RG500", "frames and seconds both say how long the film is; leave out one"))
     if seconds is not None and not (isinstance(seconds, int | float) and 0 < seconds < math.inf):
@@ -61,11 +57,7 @@ def standstill_warning(expanded: Expanded, *, film: bool, turntable: str = "--tu
 
 
 def check_keyframes(graph: Graph, scene: Scene) -> list[Problem]:
-    """Check the keyframes of `nodes.ID.PARAM`; return warnings about nodes that another pipeline may have.
-
-    Raises:
-        InputError: there is no such parameter, it cannot change from frame to frame, or a value does not fit it.
-    """
+    """Check the keyframes of `nodes.ID.PARAM`; return warnings about nodes that another pipeline may have."""
     problems, warnings = [], []
     for node, name, curve in scene.node_curves:
         what = f"keyframes of 'nodes.{node}.{name}'"

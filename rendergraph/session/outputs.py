@@ -12,11 +12,7 @@ from rendergraph.session.values import OutputRequest, Planned
 
 
 def requested_outputs(graph: Graph, options: RenderOptions) -> dict[str, OutputRequest]:
-    """Return what must exist at the end of a frame, by the name of the output or tap.
-
-    Raises:
-        InputError: the pipeline has no such output, port, or part of one.
-    """
+    """Return what must exist at the end of a frame, by the name of the output or tap."""
     requests: dict[str, OutputRequest] = {}
     problems = []
     for name in graph.outputs if options.outputs is None else options.outputs:

@@ -85,11 +85,7 @@ class PictureMetadata(Struct, frozen=True):
 
 
 def metadata(path: Path) -> dict[str, str]:
-    """Return the metadata of a picture by name, at least `pipeline`.
-
-    Raises:
-        InputError: it cannot be read, or has no such metadata.
-    """
+    """Return the metadata of a picture by name, at least `pipeline`; InputError if it has none."""
     from rendergraph.images import read_metadata  # most pipelines are files
 
     record_read(path)
@@ -101,11 +97,7 @@ def metadata(path: Path) -> dict[str, str]:
 
 
 def read_picture_metadata(path: Path, limits: YamlLimits) -> PictureMetadata:
-    """Return how a picture was made.
-
-    Raises:
-        InputError: as from `metadata`.
-    """
+    """Return how a picture was made; InputError if it does not say so."""
     from rendergraph.read import read  # see above
 
     fields = metadata(path)

@@ -16,17 +16,9 @@ _WIDTH = 30
 
 @contextmanager
 def report_progress(progress: Progress | bool | None, word: str | Callable[[], str]) -> Iterator[Progress]:
-    """Yield the function to call: the one that was given, one that shows a bar for `True`, else one that does nothing.
-
-    Args:
-        progress: as the caller passed it.
-        word: the unit of the numbers, such as `frames`; or a function that returns it, with further text.
-    """
-    if not isinstance(progress, bool):
+    """Yield the function to call: the one that was given, a `Bar` for `True`, else one that does nothing."""
+    if progress is not True:
         yield progress or _ignore
-        return
-    if not progress or sys.stderr is None:
-        yield _ignore
         return
     bar = Bar(word)
     try:
@@ -36,7 +28,10 @@ def report_progress(progress: Progress | bool | None, word: str | Callable[[], s
 
 
 class Bar:
-    """A bar on stderr with the speed and the remaining time; `word` is the unit of the numbers, or returns it."""
+    """A bar on stderr with the speed and the remaining time.
+
+    `word` is the unit of the numbers, such as `frames`, or a function that returns it with further text.
+    """
 
     def __init__(self, word: str | Callable[[], str], *, shown: bool = True) -> None:
         self._shown = shown and sys.stderr is not None

@@ -89,20 +89,13 @@ class Scene(dict[str, Any]):
 
 
 class Values:
-    """Converts Python values to plain data, one after the other.
-
-    Attributes:
-        folders: folders of files that have been written.
-        shaders: files of shader text, which are node types.
-        types: node classes by the names of their types.
-        nodes: further nodes of the pipeline, which hold arrays.
-    """
+    """Converts Python values to plain data, one after the other."""
 
     def __init__(self) -> None:
-        self.folders: set[Path] = set()
-        self.shaders: dict[str, Path] = {}
-        self.types: dict[str, type[Node]] = {}
-        self.nodes: dict[str, dict[str, str]] = {}
+        self.folders: set[Path] = set()  # of files that have been written
+        self.shaders: dict[str, Path] = {}  # files of shader text, which are node types
+        self.types: dict[str, type[Node]] = {}  # node classes by the names of their types
+        self.nodes: dict[str, dict[str, str]] = {}  # further nodes of the pipeline, which hold arrays
 
     def plain(self, value: Any, *keys: str) -> Any:
         """Return a value, or what replaces it, at a path of keys as in a pipeline's file."""

@@ -51,11 +51,8 @@ if TYPE_CHECKING:
 def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
     """Read the file and everything it refers to, and apply the selection; of a picture, the pipeline in its metadata.
 
-    Only a file that is missing, not YAML, or extends itself is an error here; `link` reports all other mistakes.
-
-    Args:
-        selection: the pipeline, and the changes to it.
-        catalog: the available node types; by default the installed ones and those of plugins.
+    Only a file that is missing, not YAML, or extends itself is an error here; `link` reports all other mistakes. By
+    default, the catalog has the installed node types and those of plugins.
     """
     for folder in selection.asset_roots:
         if not folder.is_dir():
@@ -249,12 +246,7 @@ def draw(expanded: Expanded, gpu: Gpu, lead: int | None = None) -> Iterator[Fram
     """Render frame after frame, and yield each before the next one is rendered.
 
     Between two frames the device is in its previous state, so a borrowed one can be used; this `gpu` itself can render
-    nothing else meanwhile.
-
-    Args:
-        expanded: what to render.
-        gpu: where to render.
-        lead: number of frames rendered before the first, if frames depend on earlier ones; all by default.
+    nothing else meanwhile. If frames depend on earlier ones, `lead` frames are rendered before the first (default: all).
     """
     with gpu.current():
         drawing = compile(expanded, gpu)

@@ -22,18 +22,12 @@ if TYPE_CHECKING:
 
 
 class OutputRequest(Struct, frozen=True):
-    """A port whose texture must exist at the end of a frame, and the part of it that is read.
-
-    Attributes:
-        end: the port.
-        layer, mip: the part; None for all layers and for mip 0.
-        stencil: read the stencil instead of the depth.
-    """
+    """A port whose texture must exist at the end of a frame, and the part of it that is read."""
 
     end: Endpoint
-    layer: int | None = None
-    mip: int | None = None
-    stencil: bool = False
+    layer: int | None = None  # None for all
+    mip: int | None = None  # None for 0
+    stencil: bool = False  # instead of the depth
 
     def lacks(self, desc: TextureDesc | None) -> str | None:
         """Return why a texture lacks the requested part, as the end of a sentence that starts with the port."""

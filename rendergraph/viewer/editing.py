@@ -120,12 +120,7 @@ def is_in_opened(place: Place, selection: Selection) -> bool:
 
 
 def in_place(opened: Selection, selection: Selection, file: Path, text: str) -> str:
-    """Return a file's text with all changes, so that `run FILE` renders what the page shows.
-
-    Raises:
-        InputError: the selection does not link.
-        UsageError: (RG500) some of the changes cannot be written into the text.
-    """
+    """Return a file's text with all changes, so that `run FILE` renders what the page shows; UsageError if impossible."""
     resolved, scene = _resolved(selection, file.parent)
     wanted = resolved | scene
     pipeline = PipelineText(text, file, Catalog.discover(opened.plugins))
@@ -145,11 +140,7 @@ def in_place(opened: Selection, selection: Selection, file: Path, text: str) -> 
 
 
 def variant(opened: Selection, selection: Selection, file: Path) -> str:
-    """Return the text of a new file that extends the opened one with all changes, including the camera.
-
-    Raises:
-        InputError: the selection does not link.
-    """
+    """Return the text of a new file that extends the opened one with all changes, including the camera."""
     if selection.text is None or own_file(opened) is None:
         with contextlib.suppress(UsageError):  # otherwise changes are written as a difference
             return in_place(opened, selection, file, selection.text or f"rendergraph: 1\nextends: {opened.source}\n")

@@ -47,15 +47,10 @@ _State = tuple[str | None, Mapping[str, str]]
 
 
 class Edits(Struct, frozen=True):
-    """The changes, with undo and redo.
+    """The changes, with undo and redo."""
 
-    Attributes:
-        current: settings by path (`ao.radius`, `shadows.type`, `light.occlusion`, `camera`), in order.
-        text: the file after changes of its graph; None stands for the file on disk.
-    """
-
-    current: Mapping[str, str] = {}
-    text: str | None = None
+    current: Mapping[str, str] = {}  # settings by path: `ao.radius`, `shadows.type`, `light.occlusion`, `camera`
+    text: str | None = None  # the file after changes of its graph; None stands for the file on disk
     before: tuple[_State, ...] = ()
     after: tuple[_State, ...] = ()
 
@@ -116,27 +111,21 @@ class Edits(Struct, frozen=True):
 
 @dataclass
 class ViewState:
-    """The state of the pages.
-
-    Attributes:
-        camera: the camera while it is being moved; a finished drag is an edit.
-        held: whether something is being dragged.
-        revision: revision of the description that pages have.
-    """
+    """The state of the pages."""
 
     opened: Selection
     folder: Path
     fps: float = 30.0
     against: tuple[str, Selection] | None = None
     edits: Edits = field(default_factory=Edits)
-    camera: Camera | None = None
+    camera: Camera | None = None  # while it is being moved; a finished drag is an edit
     frame: int = 1
     playing: bool = False
     port: str = ""
     exposure: float = 0.0
     look: messages.Look = field(default_factory=messages.Look)
-    held: bool = False
-    revision: int = 0
+    held: bool = False  # whether something is being dragged
+    revision: int = 0  # of the description that pages have
 
     def __post_init__(self) -> None:
         self._last_camera: Camera | None = None  # camera of the last picture
@@ -261,12 +250,7 @@ class ViewState:
         return text, editing.difference(before, text, path.name), _digest(before)
 
     def save(self, name: object, digest: str) -> str:
-        """Write the file and return its text; for the opened file, `digest` identifies the contents that it replaces.
-
-        Raises:
-            InputError: the pipeline does not link.
-            UsageError: (RG500) the name is not a plain name; (RG531) the file exists, or has changed.
-        """
+        """Write the file and return its text; `digest` identifies the contents of the opened file that it replaces."""
         path = self._path(name)
         text, _, found = self.draft(name)
         if path != self._own and path not in self._written:
