@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from html import escape
 from itertools import groupby
 from typing import Any
@@ -185,11 +186,11 @@ def _dot_table(card: Card) -> str:
     cells = [f'<tr><td bgcolor="#dfe4ea" align="left"><b>{escape(card.id)}</b>  {escape(card.kind)}</td></tr>']
     for socket in card.outputs:
         carries = f'<font color="#57606a">{escape(socket.carries)}</font>  ' if socket.carries else ""
-        cells.append(
-            f'<tr><td port="{escape("out " + socket.name)}" align="right">{carries}{escape(socket.name)}</td></tr>'
-        )
+        name = escape(socket.name)
+        cells.append(f'<tr><td port="out {name}" align="right">{carries}{name}</td></tr>')
     for socket in card.inputs:
-        cells.append(f'<tr><td port="{escape("in " + socket.name)}" align="left">{escape(socket.name)}</td></tr>')
+        name = escape(socket.name)
+        cells.append(f'<tr><td port="in {name}" align="left">{name}</td></tr>')
     return f'<table border="1" color="#7d8590" cellborder="0" cellspacing="0" cellpadding="4">{"".join(cells)}</table>'
 
 
@@ -221,6 +222,25 @@ def _mermaid(word: str) -> str:
     return "".join(c if c.isalnum() or c in " _-.,/→×" else f"#{ord(c)};" for c in word)
 
 
+def svg_document(width: float, height: float, parts: Iterable[str]) -> str:
+    font = "ui-monospace,'DejaVu Sans Mono',Menlo,Consolas,monospace"
+    size = f'viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" height="{height:.0f}"'
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="{font}" font-size="11">'
+    return "\n".join([head, *parts, "</svg>"]) + "\n"
+
+
+def element(name: str, content: str | None = None, /, **attributes: object) -> str:
+    """Return an element of SVG with markup in it; lengths have one decimal, and None leaves an attribute out."""
+    given = {key.rstrip("_").replace("_", "-"): value for key, value in attributes.items() if value is not None}
+    texts = [f'{key}="{value:.1f}"' if isinstance(value, float) else f'{key}="{value}"' for key, value in given.items()]
+    head = " ".join([name, *texts])
+    return f"<{head}/>" if content is None else f"<{head}>{content}</{name}>"
+
+
+def title(text: str) -> str:
+    return f"<title>{escape(text)}</title>"
+
+
 def texture_json(desc: TextureDesc) -> dict[str, Any]:
     return {
         "format": desc.format,
@@ -237,9 +257,7 @@ def graph_json(graph: Graph) -> dict[str, Any]:
         "name": graph.name,
         "size": list(graph.size),
         "nodes": [_node_json(graph, card) for card in cards(graph)],
-        "links": [
-            {name: value for name, value in each.items() if name != "back"} for each in to_builtins(links(graph))
-        ],
+        "links": [{key: value for key, value in link.items() if key != "back"} for link in to_builtins(links(graph))],
         "outputs": {name: str(end) for name, end in graph.outputs.items()},
     }
 

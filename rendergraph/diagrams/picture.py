@@ -10,13 +10,12 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from rendergraph.diagrams.layout import LANE, Box, layers_of, place, tie
-from rendergraph.diagrams.markup import Card, Link, Socket, cards, links
+from rendergraph.diagrams.markup import Card, Link, Socket, cards, element, links, svg_document, title
 from rendergraph.link import Endpoint, Graph
 
 ROW, HEAD, PAD, RADIUS = 20.0, 40.0, 12.0, 4.0
 CHARACTER = 6.65  # width of a character of the 11-pixel monospace, with some margin
 COLUMN_GAP = 60.0
-FONT = "ui-monospace,'DejaVu Sans Mono',Menlo,Consolas,monospace"
 TITLE_FONT = "system-ui,'DejaVu Sans',sans-serif"
 MARGIN = 24.0
 
@@ -129,12 +128,7 @@ class _Picture:
         returns = [link for link in self.links if link.previous or link.back]
         width = (self.lefts[-1] + self.widths[-1] if self.widths else 0.0) + MARGIN
         height = self.bottom + 2 * MARGIN + (14 * len(returns) + 10 if returns else 0)
-        parts = [
-            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" '
-            f'height="{height:.0f}" font-family="{FONT}" font-size="11">',
-            f"<title>{escape(self.title)}</title>",
-            f"<style>{STYLE}</style>",
-        ]
+        parts = [title(self.title), f"<style>{STYLE}</style>"]
         for trunk in self.trunks:
             parts += self._trunk(trunk)
         for number, link in enumerate(returns, start=1):
@@ -145,7 +139,7 @@ class _Picture:
                 parts += _card(card, self.lefts[layer], y, self.widths[layer], self.marks.get(id))
             else:
                 parts.append(_pill(card, self.lefts[layer], y))
-        return "\n".join([*parts, "</svg>"]) + "\n"
+        return svg_document(width, height, parts)
 
     def _source(self, link: Link) -> tuple[float, float]:
         box = self.boxes[link.source]
@@ -169,7 +163,7 @@ class _Picture:
             path += _bend(ends[layer - 1], (self.lefts[layer], y), begin=not path) + f"H{right:.1f}"
             ends[layer] = (right, y)
         if path:
-            yield _stroke(f"{first.source}.{first.source_port}", path, self._color(first), "")
+            yield _stroke(f"{first.source}.{first.source_port}", path, self._color(first))
         for link in trunk.links:
             start = ends[self.boxes[link.target].layer - 1]
             yield self._link(link, _bend(start, self._target(link), begin=True))
@@ -188,12 +182,12 @@ class _Picture:
 
     def _link(self, link: Link, path: str) -> str:
         previous = "@previous" if link.previous else ""
-        title = f"{link.source}.{link.source_port}{previous} → {link.target}.{link.target_port}"
+        text = f"{link.source}.{link.source_port}{previous} → {link.target}.{link.target_port}"
         if link not in self.highlights:
-            return _stroke(title, path, self._color(link), ' stroke-dasharray="5 4"' if link.previous else "")
+            return _stroke(text, path, self._color(link), stroke_dasharray="5 4" if link.previous else None)
         color = self.highlights[link].removeprefix("-")
-        dashes = ' stroke-dasharray="3 5"' if self.highlights[link] != color else ""
-        return _stroke(title, path, color, f' class="pointed"{dashes}')
+        dashes = "3 5" if self.highlights[link] != color else None
+        return _stroke(text, path, color, class_="pointed", stroke_dasharray=dashes)
 
 
 # --- measures --------------------------------------------------------------------------------------------------------
@@ -236,51 +230,45 @@ def _bend(start: tuple[float, float], end: tuple[float, float], *, begin: bool) 
     return f"{move}C{middle:.1f} {y:.1f} {middle:.1f} {end_y:.1f} {end_x:.1f} {end_y:.1f}"
 
 
-def _stroke(title: str, path: str, color: str, extra: str) -> str:
-    line = f'<path d="{path}" fill="none" stroke="{color}" stroke-width="1.6"{extra}>'
-    return f"{line}<title>{escape(title)}</title></path>"
+def _stroke(text: str, path: str, color: str, **attributes: str | None) -> str:
+    return element("path", title(text), d=path, fill="none", stroke=color, stroke_width=1.6, **attributes)
 
 
 def _pill(card: Card, x: float, y: float) -> str:
+    socket = card.inputs[0]
+    frame = element("rect", class_="card", x=x, y=y, width=_width(card), height=26, rx=13)
     return (
-        f'<rect class="card" x="{x:.1f}" y="{y:.1f}" width="{_width(card):.1f}" height="26" rx="13"/>'
-        + _dot(x, y + 13, card.inputs[0])
-        + f'<text class="port" x="{x + 2 * PAD:.1f}" y="{y + 17:.1f}">{escape(card.inputs[0].name)}</text>'
+        frame + _dot(x, y + 13, socket) + element("text", escape(socket.name), class_="port", x=x + 2 * PAD, y=y + 17)
     )
 
 
 def _card(card: Card, x: float, y: float, width: float, mark: Mark | None) -> Iterator[str]:
-    frame = f'x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{_height(card):.1f}" rx="6"'
-    dashes = ' stroke-dasharray="6 4"' if card.unknown else ""
-    yield f'<rect class="card" {frame}{dashes}/>'
-    yield (
-        f'<path class="head" d="M{x + 0.5:.1f} {y + HEAD - 4:.1f}v-{HEAD - 10.5:.1f}q0-6 6-6h{width - 13:.1f}q6 0 6 6'
-        f'v{HEAD - 10.5:.1f}z"/>'
-    )
-    yield f'<text class="name" x="{x + PAD:.1f}" y="{y + 16:.1f}" font-family="{TITLE_FONT}">{escape(card.id)}</text>'
-    yield f'<text class="type" x="{x + PAD:.1f}" y="{y + 30:.1f}">{escape(card.kind)}</text>'
+    frame = {"x": x, "y": y, "width": width, "height": _height(card), "rx": 6}
+    left, side = x + PAD, HEAD - 10.5
+    yield element("rect", class_="card", **frame, stroke_dasharray="6 4" if card.unknown else None)
+    head = f"M{x + 0.5:.1f} {y + HEAD - 4:.1f}v-{side:.1f}q0-6 6-6h{width - 13:.1f}q6 0 6 6v{side:.1f}z"
+    yield element("path", class_="head", d=head)
+    yield element("text", escape(card.id), class_="name", x=left, y=y + 16, font_family=TITLE_FONT)
+    yield element("text", escape(card.kind), class_="type", x=left, y=y + 30)
     for socket in card.outputs:
         middle = y + _out_height(card, socket.name)
         yield _dot(x + width, middle, socket)
-        yield (
-            f'<text class="port{"" if socket.used else " unused"}" x="{x + width - PAD:.1f}" y="{middle + 4:.1f}" '
-            f'text-anchor="end"><tspan class="fact">{escape(socket.carries)}</tspan>  {escape(socket.name)}</text>'
-        )
+        text = f"{element('tspan', escape(socket.carries), class_='fact')}  {escape(socket.name)}"
+        kind = "port" if socket.used else "port unused"
+        yield element("text", text, class_=kind, x=x + width - PAD, y=middle + 4, text_anchor="end")
     for socket in card.inputs:
         middle = y + _in_height(card, socket.name)
         yield _dot(x, middle, socket)
-        yield f'<text class="port" x="{x + PAD:.1f}" y="{middle + 4:.1f}">{escape(socket.name)}</text>'
+        yield element("text", escape(socket.name), class_="port", x=left, y=middle + 4)
     if mark is not None:
-        yield f'<rect class="mark" {frame} fill="{mark.color}" stroke="{mark.color}"/>'
+        yield element("rect", class_="mark", **frame, fill=mark.color, stroke=mark.color)
         top = y + HEAD + ROW * (len(card.outputs) + len(card.inputs))
         for number, note in enumerate(card.notes):
             row = top + ROW * (number + 0.5) + 4
-            yield f'<text class="note" x="{x + PAD:.1f}" y="{row:.1f}" fill="{mark.color}">{escape(note)}</text>'
+            yield element("text", escape(note), class_="note", x=left, y=row, fill=mark.color)
 
 
 def _dot(x: float, y: float, socket: Socket) -> str:
-    color = _color(socket)
-    return (
-        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{RADIUS}" fill="{color if socket.used else "none"}" stroke="{color}" '
-        f'stroke-width="1.5"><title>{escape(socket.kind)} · {escape(socket.semantic)}</title></circle>'
-    )
+    color, text = _color(socket), title(f"{socket.kind} · {socket.semantic}")
+    fill = color if socket.used else "none"
+    return element("circle", text, cx=x, cy=y, r=RADIUS, fill=fill, stroke=color, stroke_width=1.5)

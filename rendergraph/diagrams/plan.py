@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from html import escape
 from itertools import accumulate, groupby
 from pathlib import Path
 from typing import Any
 
 from rendergraph.allocate import ResourcePlan
-from rendergraph.diagrams.markup import format_texture, texture_json
+from rendergraph.diagrams.markup import element, format_texture, svg_document, texture_json, title
 from rendergraph.formatting import format_bytes, table
 from rendergraph.schedule import step_names
 from rendergraph.steps import Resource, Step
@@ -238,99 +238,71 @@ def lifetimes_svg(plan: ResourcePlan) -> str:
     top = MARGIN + 26 + CHARACTER * max((len(name) for name in names.values()), default=0) * 0.94 + 8
     memory = plan.memory
     proof = "" if memory.proven else f" (bound {format_bytes(memory.lower_bound_bytes)})"
-    caption = (
-        f"allocated {format_bytes(memory.allocated_bytes)} of {format_bytes(memory.no_reuse_bytes)} without reuse · "
-        f"least peak {format_bytes(memory.least_peak_bytes)}{proof} · shared by {memory.tier}"
-    )
-    parts = [f'<text class="ink" x="{MARGIN}" y="{MARGIN + 8}" font-weight="600">{escape(caption)}</text>']
+    caption = f"allocated {format_bytes(memory.allocated_bytes)} of {format_bytes(memory.no_reuse_bytes)} without reuse"
+    caption += f" · least peak {format_bytes(memory.least_peak_bytes)}{proof} · shared by {memory.tier}"
+    parts = [element("text", escape(caption), class_="ink", x=MARGIN, y=MARGIN + 8, font_weight=600)]
     for number, step in enumerate(steps):
-        x = left + CELL * (number + 0.5)
-        parts.append(
-            f'<text class="ink" transform="translate({x + 4:.1f} {top - 8:.1f}) rotate(-90)">{escape(names[step.key])}'
-            f"<title>{escape(plan.schedule.reasons.get(step.key, ''))}</title></text>"
-        )
+        place = f"translate({left + CELL * (number + 0.5) + 4:.1f} {top - 8:.1f}) rotate(-90)"
+        text = escape(names[step.key]) + title(plan.schedule.reasons.get(step.key, ""))
+        parts.append(element("text", text, class_="ink", transform=place))
     y = top
-    group: tuple[int, ...] | None = None
-    for id in ids:
-        if plan.placement[id] != group:
-            group = plan.placement[id]
-            members = sum(1 for other in ids if plan.placement[other] == group)
-            y += GROUP_GAP
-            height = ROW * members
-            parts.append(
-                f'<rect class="band" x="{left:.1f}" y="{y:.1f}" width="{right - left:.1f}" height="{height}" rx="4"/>'
-            )
-        parts.append(_row(plan, id, left, right, y, facts[id]))
-        y += ROW
-    y = _chart(parts, plan, left, right, y + 16)
+    for _, group in groupby(ids, plan.placement.__getitem__):
+        members = list(group)
+        y += GROUP_GAP
+        band = {"x": left, "y": y, "width": right - left, "height": ROW * len(members)}
+        parts.append(element("rect", class_="band", **band, rx=4))
+        for id in members:
+            parts += _row(plan, id, left, right, y, facts[id])
+            y += ROW
+    parts += _chart(plan, left, right, y + 16)
+    y += 16 + BARS
     for node, reason in sorted(plan.schedule.culled.items()):
         y += ROW
-        parts.append(
-            f'<text x="{MARGIN}" y="{y:.1f}" class="fact"><tspan text-decoration="line-through">{escape(node)}</tspan>'
-            f"  {escape(reason)}</text>"
-        )
-    y = _legend(parts, y + ROW + 6)
+        text = f"{element('tspan', escape(node), text_decoration='line-through')}  {escape(reason)}"
+        parts.append(element("text", text, x=MARGIN, y=y, class_="fact"))
+    y += ROW + 6
+    parts += _legend(y)
     widest = max((len(text) for text in facts.values()), default=0)
     width = max(right + 14 + CHARACTER * widest, MARGIN + CHARACTER * 1.1 * len(caption)) + MARGIN
-    head = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {y + MARGIN:.0f}" width="{width:.0f}" '
-        f'height="{y + MARGIN:.0f}" font-family="ui-monospace,\'DejaVu Sans Mono\',Menlo,Consolas,monospace" '
-        f'font-size="11">\n<style>{STYLE}</style>'
-    )
-    return "\n".join([head, *parts, "</svg>"]) + "\n"
+    return svg_document(width, y + MARGIN, [f"<style>{STYLE}</style>", *parts])
 
 
-def _row(plan: ResourcePlan, id: str, left: float, right: float, y: float, fact: str) -> str:
+def _row(plan: ResourcePlan, id: str, left: float, right: float, y: float, fact: str) -> Iterator[str]:
     life = plan.lifetimes[id]
-    middle = y + ROW / 2 + 4
-    why = f"<title>{escape(plan.reasons[id])}</title>"
-    parts = [
-        f'<text class="ink" x="{left - 8:.1f}" y="{middle:.1f}" text-anchor="end">{escape(id)}</text>',
-        f'<text class="fact" x="{right + 10:.1f}" y="{middle:.1f}">{escape(fact)}{why}</text>',
-        f'<rect class="alive" x="{left + CELL * life.first + 2:.1f}" y="{y + 7:.1f}" '
-        f'width="{CELL * (life.last - life.first + 1) - 4:.1f}" height="{ROW - 14:.1f}" rx="3"/>',
-    ]
+    middle, span = y + ROW / 2 + 4, CELL * (life.last - life.first + 1)
+    yield element("text", escape(id), class_="ink", x=left - 8, y=middle, text_anchor="end")
+    yield element("text", escape(fact) + title(plan.reasons[id]), class_="fact", x=right + 10, y=middle)
+    x = left + CELL * life.first + 2
+    yield element("rect", class_="alive", x=x, y=y + 7, width=span - 4, height=ROW - 14, rx=3)
     for position, step in enumerate(plan.schedule.steps):
-        use = use_of(step, id)
-        if not use:
+        if not (use := use_of(step, id)):
             continue
         colour, word = USES[use]
-        x = left + CELL * position
-        parts.append(
-            f'<rect x="{x + 2:.1f}" y="{y + 2:.1f}" width="{CELL - 4:.1f}" height="{ROW - 4:.1f}" rx="3" '
-            f'fill="{colour}">'
-            f"<title>{escape(f'{step.node} {word} {id}')}</title></rect>"
-            f'<text class="use" x="{x + CELL / 2:.1f}" y="{middle:.1f}" text-anchor="middle">{use}</text>'
-        )
-    return "\n".join(parts)
+        x, what = left + CELL * position, title(f"{step.node} {word} {id}")
+        cell = element("rect", what, x=x + 2, y=y + 2, width=CELL - 4, height=ROW - 4, rx=3, fill=colour)
+        yield cell + element("text", use, class_="use", x=x + CELL / 2, y=middle, text_anchor="middle")
 
 
-def _chart(parts: list[str], plan: ResourcePlan, left: float, right: float, y: float) -> float:
+def _chart(plan: ResourcePlan, left: float, right: float, y: float) -> Iterator[str]:
     live = live_bytes(plan)
     most = max([*live, plan.memory.least_peak_bytes, 1])
     base = y + BARS
     for position, count in enumerate(live):
-        height = BARS * count / most
+        x, height = left + CELL * position + 2, BARS * count / most
         kind = "peak" if count == max(live) else "bar"
-        parts.append(
-            f'<rect class="{kind}" x="{left + CELL * position + 2:.1f}" y="{base - height:.1f}" width="{CELL - 4:.1f}" '
-            f'height="{height:.1f}"><title>{format_bytes(count)}</title></rect>'
-        )
+        bar = {"x": x, "y": base - height, "width": CELL - 4, "height": height}
+        yield element("rect", title(format_bytes(count)), class_=kind, **bar)
     bound = base - BARS * plan.memory.lower_bound_bytes / most
-    parts.append(f'<text class="fact" x="{left - 8:.1f}" y="{base:.1f}" text-anchor="end">live bytes</text>')
-    parts.append(f'<path class="bound" d="M{left:.1f} {bound:.1f}H{right:.1f}"/>')
-    parts.append(
-        f'<text class="fact" x="{right + 10:.1f}" y="{bound + 4:.1f}">lower bound '
-        f"{format_bytes(plan.memory.lower_bound_bytes)}</text>"
-    )
-    return base
+    yield element("text", "live bytes", class_="fact", x=left - 8, y=base, text_anchor="end")
+    yield element("path", class_="bound", d=f"M{left:.1f} {bound:.1f}H{right:.1f}")
+    text = f"lower bound {format_bytes(plan.memory.lower_bound_bytes)}"
+    yield element("text", text, class_="fact", x=right + 10, y=bound + 4)
 
 
-def _legend(parts: list[str], y: float) -> float:
+def _legend(y: float) -> Iterator[str]:
     x = MARGIN
     for use, (colour, word) in USES.items():
-        parts.append(f'<rect x="{x:.1f}" y="{y - 10:.1f}" width="14" height="14" rx="3" fill="{colour}"/>')
-        parts.append(f'<text class="use" x="{x + 7:.1f}" y="{y + 1:.1f}" text-anchor="middle">{use}</text>')
-        parts.append(f'<text class="fact" x="{x + 20:.1f}" y="{y + 1:.1f}">{escape(word)}</text>')
+        yield element("rect", x=x, y=y - 10, width=14, height=14, rx=3, fill=colour)
+        yield element("text", use, class_="use", x=x + 7, y=y + 1, text_anchor="middle")
+        yield element("text", escape(word), class_="fact", x=x + 20, y=y + 1)
         x += 20 + CHARACTER * len(word) + 18
-    return y

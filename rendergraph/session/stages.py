@@ -246,7 +246,7 @@ def draw(expanded: Expanded, gpu: Gpu, lead: int | None = None) -> Iterator[Fram
     """Render frame after frame, and yield each before the next one is rendered.
 
     Between two frames the device is in its previous state, so a borrowed one can be used; this `gpu` itself can render
-    nothing else meanwhile. If frames depend on earlier ones, `lead` frames are rendered before the first (default: all).
+    nothing else meanwhile. If frames depend on earlier ones, `lead` are rendered before the first, by default all.
     """
     with gpu.current():
         drawing = compile(expanded, gpu)

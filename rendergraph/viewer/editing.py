@@ -120,7 +120,7 @@ def is_in_opened(place: Place, selection: Selection) -> bool:
 
 
 def in_place(opened: Selection, selection: Selection, file: Path, text: str) -> str:
-    """Return a file's text with all changes, so that `run FILE` renders what the page shows; UsageError if impossible."""
+    """Return a file's text with all changes, so that `run FILE` renders what the page shows, or a UsageError."""
     resolved, scene = _resolved(selection, file.parent)
     wanted = resolved | scene
     pipeline = PipelineText(text, file, Catalog.discover(opened.plugins))
