@@ -152,11 +152,9 @@ class Executor(AbstractContextManager["Executor"], ABC):
             return TaskOutput(task, worker, value)
         if kind == "finished":
             return TaskFinished(task, worker, value)
-        return (
-            self.retry(task, worker, value)
-            if kind == "lost" or is_retryable(value)
-            else TaskFailed(task, worker, value)
-        )
+        if kind == "lost" or is_retryable(value):
+            return self.retry(task, worker, value)
+        return TaskFailed(task, worker, value)
 
     def retry(self, task: Task, worker: str, error: RendergraphError, *, inputs_lost: bool = False) -> Event:
         """Submit a task again whose worker was lost, unless that happened too often; its inputs may be lost, too."""

@@ -173,14 +173,10 @@ def _finite(source: ImageSource, pixels: Pixels, warn: Warn | None) -> Pixels:
 
 def _as_rgba(pixels: Pixels) -> Pixels:
     """Return four channels from one to four: grey is repeated, and a missing alpha is 1."""
-    height, width, count = pixels.shape
-    one = 255 if pixels.dtype == np.uint8 else 1
-    rgba = np.full((height, width, 4), one, dtype=pixels.dtype)
-    if count <= 2:
-        rgba[..., :3] = pixels[..., :1]
-        rgba[..., 3:] = pixels[..., 1:] if count == 2 else one
-    else:
-        rgba[..., :count] = pixels
+    if pixels.shape[-1] <= 2:
+        pixels = np.concatenate([np.repeat(pixels[..., :1], 3, axis=-1), pixels[..., 1:]], axis=-1)
+    rgba = np.full((*pixels.shape[:2], 4), 255 if pixels.dtype == np.uint8 else 1, dtype=pixels.dtype)
+    rgba[..., : pixels.shape[-1]] = pixels
     return rgba
 
 

@@ -98,9 +98,8 @@ def _write_job(job: Job, part: Path, metadata: Mapping[str, str]) -> None:
         elif shaped.ndim == 4:
             names = tuple(f"{layer:03d}.{name}" for layer in range(len(shaped)) for name in names)
             shaped = np.moveaxis(shaped, 0, 2).reshape(*shaped.shape[1:3], -1)
-    is_light = encoding != "data"
     try:
-        _write_file(path, part, shaped, names, kind, metadata, is_light=is_light)
+        _write_file(job, part, shaped, names, kind, metadata)
     except OSError as error:
         raise failed(path, error.strerror or str(error)) from error
 
@@ -141,15 +140,9 @@ def _error(path: Path, reason: str) -> InputError:
 
 
 def _write_file(
-    path: Path,
-    part: Path,
-    pixels: Pixels,
-    names: Sequence[str] | None,
-    kind: str,
-    metadata: Mapping[str, str],
-    *,
-    is_light: bool,
+    job: Job, part: Path, pixels: Pixels, names: Sequence[str] | None, kind: str, metadata: Mapping[str, str]
 ) -> None:
+    path, _, _, encoding, _ = job
     texts = {key if key.startswith(PREFIX) else PREFIX + key: text for key, text in metadata.items()}
     if kind == "uint8" and path.suffix.lower() == ".png":
         with open(part, "wb") as file:
@@ -164,7 +157,7 @@ def _write_file(
     if path.suffix.lower() == ".exr":
         spec.attribute("compression", "zip")
         spec.attribute("DateTime", _NO_DATE)
-        if is_light and names and "R" in names[0]:
+        if encoding != "data" and names and "R" in names[0]:
             spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), REC709)
     elif EXTENSIONS[path.suffix.lower()] == "jpeg":
         spec.attribute("Compression", "jpeg:95")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import os
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -16,7 +16,7 @@ import numpy.typing as npt
 from msgspec import Struct
 
 from rendergraph.errors import InputError, Place, Problem, UsageError, suggestion
-from rendergraph.images.encode import EXTENSIONS, Job, picture_bytes, write, write_all
+from rendergraph.images.encode import EXTENSIONS, Encoding, Job, picture_bytes, write, write_all
 from rendergraph.images.viewable import Bytes, from_srgb, heat_map, viewable
 from rendergraph.textures import FORMATS
 
@@ -37,17 +37,11 @@ class TexelInfo(Protocol):
 
 
 class PictureInfo(Struct, frozen=True):
-    """The meaning of an array's values without a frame.
-
-    Attributes:
-        semantic: name of the semantic, `any` if unknown.
-        format: a name in `textures.FORMATS`, empty if unknown.
-        encoding: `display` for sRGB-encoded colours, `linear` for linear ones, else None.
-    """
+    """The meaning of an array's values without a frame."""
 
     semantic: str = "any"
-    format: str = ""
-    encoding: str | None = None
+    format: str = ""  # a name in `textures.FORMATS`, empty if unknown
+    encoding: str | None = None  # `display` for sRGB-encoded colours, `linear` for linear ones
     transparent: bool = False
 
 
@@ -112,13 +106,8 @@ def _job(file: Saved) -> Job:
     pixels = _numbers(pixels, info)
     shaped = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
     half = decoded or info.format in _HALF_FORMATS or pixels.dtype == np.float16
-    return (
-        path,
-        shaped,
-        channel_names(info, shaped.shape[-1]),
-        "display" if decoded else "linear" if info.encoding == "linear" else "data",
-        half,
-    )
+    encoding: Encoding = "display" if decoded else "linear" if info.encoding == "linear" else "data"
+    return path, shaped, channel_names(info, shaped.shape[-1]), encoding, half
 
 
 def viewable_as(pixels: Pixels, info: TexelInfo) -> Bytes:
@@ -154,13 +143,9 @@ def output_for(path: Path, outputs: Collection[str]) -> str:
         if name in outputs:
             return name
     known = sorted(outputs)
-    if not known:
-        raise InputError(
-            Problem("RG505", f"'{path}' needs the output '{defaults[0]}', but the pipeline has no outputs")
-        )
-    text = f"'{path}' needs the output '{defaults[0]}', which the pipeline lacks; name one: -o {known[0]}={path}"
-    text += f" (available: {', '.join(known)})" if len(known) > 1 else ""
-    raise InputError(Problem("RG505", text))
+    why = f"which the pipeline lacks; name one: -o {known[0]}={path}" if known else "but the pipeline has no outputs"
+    why += f" (available: {', '.join(known)})" if len(known) > 1 else ""
+    raise InputError(Problem("RG505", f"'{path}' needs the output '{defaults[0]}', {why}"))
 
 
 _HASHES = re.compile(r"#{2,}")
@@ -267,9 +252,9 @@ def shown(
     elif layer not in (None, 0):
         raise _mistake(f"'{name}' has no layers, so there is no layer {layer}")
     if layer is not None and array.ndim == 4:
-        array, name = _chosen(array, layer, name, "layer", lambda number: array[number])
+        array, name = _chosen(array, 0, layer, name, "layer")
     if channel is not None:
-        array, name = _chosen(np.moveaxis(array, -1, 0), channel, name, "channel", lambda number: array[..., number])
+        array, name = _chosen(array, -1, channel, name, "channel")
         array = array[..., None]
     elif semantic in _COLORS and array.shape[-1] > 1:
         return Shown(name, viewable(array, semantic, encoding))
@@ -282,12 +267,10 @@ def shown(
     return Shown(name, heat_map((values - low) / max(high - low, 1e-30)), low, high)
 
 
-def _chosen(
-    parts: npt.NDArray[Any], number: int, name: str, what: str, take: Callable[[int], npt.NDArray[Any]]
-) -> tuple[npt.NDArray[Any], str]:
-    if not 0 <= number < len(parts):
-        raise _mistake(f"'{name}' has {len(parts)} {what}s, so there is no {what} {number}")
-    return take(number), f"{name}, {what} {number}"
+def _chosen(array: Pixels, axis: int, number: int, name: str, what: str) -> tuple[Pixels, str]:
+    if not 0 <= number < array.shape[axis]:
+        raise _mistake(f"'{name}' has {array.shape[axis]} {what}s, so there is no {what} {number}")
+    return array.take(number, axis), f"{name}, {what} {number}"
 
 
 def _mistake(text: str) -> InputError:

@@ -15,6 +15,7 @@ One channel is grey, two are red and green, a fourth is ignored; layers form a g
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any, TypeAlias
@@ -170,18 +171,12 @@ def _stretched(array: Pixels, background: float, outside: float = 0.0) -> npt.ND
 
 def _palette(array: Pixels) -> Bytes:
     """Return a colour for each integer, with distinct ones for neighbours: multiples of the golden ratio as hues."""
-    number = array[..., 0].astype(np.int64) if array.shape[-1] == 1 else _joined(array)
+    channels = np.moveaxis(array.astype(np.int64), -1, 0)
+    number = functools.reduce(lambda total, channel: total * 7919 + channel, channels)
     hue = (number % 65536 * 0.6180339887) % 1.0
     thirds = np.array([1.0, 2 / 3, 1 / 3])
     rgb = np.clip(np.abs((hue[..., np.newaxis] + thirds) % 1.0 * 6 - 3) - 1, 0, 1) * 0.75 + 0.25
     return to_bytes(np.where(number[..., np.newaxis] == 0, 0.0, rgb))
-
-
-def _joined(array: Pixels) -> npt.NDArray[np.int64]:
-    total = np.zeros(array.shape[:-1], dtype=np.int64)
-    for channel in range(array.shape[-1]):
-        total = total * 7919 + array[..., channel].astype(np.int64)
-    return total
 
 
 def _grid(layers: Bytes) -> Bytes:

@@ -64,9 +64,7 @@ class Gpu:
 
     def close(self) -> None:
         """Free everything, the context too unless it was borrowed; only the thread that created it may do so."""
-        if self._closed:
-            return
-        if os.getpid() != self._process or self.device.is_released:  # everything belongs to another process, or is gone
+        if not self.is_usable:  # everything belongs to another process, or is gone
             self._closed = True
             return
         if threading.get_ident() != self._thread:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from rendergraph import stamps
@@ -18,7 +18,7 @@ from rendergraph.gl.device import Device
 from rendergraph.gl.memory import check_memory
 from rendergraph.images import decode, decode_light
 from rendergraph.scene import pack
-from rendergraph.scene.model import ImageSource, MadeImage, Scene
+from rendergraph.scene.model import ImageSource, Scene
 from rendergraph.session.scenes import scene_limits
 from rendergraph.session.values import Expanded, Linked, Planned
 from rendergraph.settings import CacheLimits
@@ -28,17 +28,6 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 _MOST_EXECUTABLES = 4
-
-
-class _Entry(Struct, eq=False):
-    """A compiled pipeline and the shader files that it was compiled from."""
-
-    executable: Executable
-    files: Stamps
-
-    @property
-    def bytes(self) -> int:
-        return self.executable.plan.memory.allocated_bytes
 
 
 class GpuCache:
@@ -55,13 +44,14 @@ class GpuCache:
         self.image_warnings: list[Problem] = []  # of the current scene
         self.active: Executable | None = None  # the last one that was compiled or found
         self.drawing: object = None  # the one that may render; all earlier ones are invalid
-        self._entries: dict[Hashable, _Entry] = {}  # least recently used first
+        # Compiled pipelines with the shader files that they were compiled from, the least recently used first.
+        self._entries: dict[Hashable, tuple[Executable, Stamps]] = {}
         self._scene: tuple[Scene, GpuScene] | None = None
 
     @property
     def executables(self) -> list[Executable]:
         """The cached executables, the least recently used first."""
-        return [entry.executable for entry in self._entries.values()]
+        return [executable for executable, _ in self._entries.values()]
 
     def upload(self, linked: Linked) -> GpuScene:
         """Return a pipeline's scene on the GPU, in place of the previous scene."""
@@ -76,12 +66,10 @@ class GpuCache:
                 return self._generator.texels(source)
             return decode(source, srgb=srgb, warn=warnings.append, limits=limits)
 
-        def decoded_light(source: ImageSource | MadeImage) -> npt.NDArray[Any]:
-            return decode_light(source, warn=warnings.append, limits=limits)
-
+        light = partial(decode_light, warn=warnings.append, limits=limits)
         self.scenes_made += 1
         self.image_warnings = warnings
-        scene = GpuScene(self._device, linked.scene, pack.pack(linked.scene), decoded, decoded_light)
+        scene = GpuScene(self._device, linked.scene, pack.pack(linked.scene), decoded, light)
         if linked.selection.environment is not None and linked.scene.environment is not None:
             scene.environment()  # the user named it: a broken one is an error whether or not it is read
         self._scene = linked.scene, scene
@@ -93,12 +81,12 @@ class GpuCache:
         entry = self._entries.pop(key, None)
         if entry is None:
             return key, None
-        if not stamps.unchanged(entry.files):
+        executable, files = entry
+        if not stamps.unchanged(files):
             self._save()
-            entry.executable.release()
+            executable.release()
             return key, None
         self._entries[key] = entry
-        executable = entry.executable
         values = {step.key: step for step in expanded.expansion.steps}
         if executable is not self.active or not executable.changed(values).isdisjoint(executable.kept):
             self._save()
@@ -119,7 +107,7 @@ class GpuCache:
                 executable = compile_plan(
                     self._device, planned.plan, types, views, scene, self.programs, self._pool, poison=poison
                 )
-            self._entries[key] = _Entry(executable, files)
+            self._entries[key] = executable, files
         finally:
             self.programs.trim({program for kept in self.executables for program in kept.programs})
         executable.recorded_steps = planned.expansion.steps
@@ -149,9 +137,9 @@ class GpuCache:
         """Free executables, until one more of `needed` bytes can be cached."""
         while self._entries and (
             len(self._entries) >= _MOST_EXECUTABLES
-            or needed + sum(entry.bytes for entry in self._entries.values()) > self.limits.bytes
+            or needed + sum(each.plan.memory.allocated_bytes for each in self.executables) > self.limits.bytes
         ):
-            self._entries.pop(next(iter(self._entries))).executable.release()
+            self._entries.pop(next(iter(self._entries)))[0].release()
 
     def _save(self) -> None:
         """Copy the kept values of the active executable, before they are lost or something else is rendered."""

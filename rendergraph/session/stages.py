@@ -137,16 +137,8 @@ def link(resolved: Resolved) -> Linked:
     if (size is None or size.data is None) and scene.camera is not None and (aspect := scene.camera.aspect) is not None:
         spec = replace(spec, size=(max(1, round(spec.size[1] * aspect)), spec.size[1]))
         resolved = replace(resolved, spec=spec)
-    graph = rendergraph.link.link(
-        spec,
-        catalog,
-        light_facts(scene),
-        object_facts(scene),
-        environment_facts(scene),
-        partial(scene_data_facts, scene),
-        material_facts(scene),
-        camera_facts(scene),
-    )
+    facts = light_facts(scene), object_facts(scene), environment_facts(scene), partial(scene_data_facts, scene)
+    graph = rendergraph.link.link(spec, catalog, *facts, material_facts(scene), camera_facts(scene))
     if scene.node_curves:
         graph = replace(graph, warnings=(*graph.warnings, *motion.check_keyframes(graph, scene)))
     return Linked(**asdict(resolved), scene=scene, graph=graph)
