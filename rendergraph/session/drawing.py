@@ -53,9 +53,8 @@ class Drawing(Struct, eq=False, dict=True):
     def __post_init__(self) -> None:
         options = self.expanded.options
         linked = self.expanded.linked
-        drives = bool(linked.scene.node_curves)
-        self._driven = Driven(linked.graph, linked.scene, self.executable) if drives else None
-        self.runner = Runner(self.executable, self.expanded.linked.graph, options.reuses, options.cull)
+        self._driven = Driven(linked.graph, linked.scene, self.executable)
+        self.runner = Runner(self.executable, linked.graph, options.reuses, options.cull)
         history = any(r.role == "history" for r in self.executable.plan.resources.values())
         self._remembers = history or self.executable.uses_previous
         # Without a history, a frame depends only on the positions in the one before it.
@@ -116,8 +115,8 @@ class Drawing(Struct, eq=False, dict=True):
         self.number = number
 
     def _draw(self, number: int, camera: Camera | None = None, *, moments: bool = True) -> FrameTimes:
-        linked, fps, still = self.expanded.linked, self.expanded.options.fps, self.expanded.options.still
-        time = ((number if still is None else min(number, still)) - 1) / fps
+        options, size = self.expanded.options, self.expanded.linked.graph.size
+        time = ((number if options.still is None else min(number, options.still)) - 1) / options.fps
         if self.runner.drawn:
             self.scene.advance()
         times: list[FrameTimes] = []
@@ -128,20 +127,18 @@ class Drawing(Struct, eq=False, dict=True):
                 self.scene.advance()  # the first frame has no motion
             self.camera = camera or scene.camera
             assert self.camera is not None  # a completed scene has one
-            view = view_matrices(self.camera, linked.graph.size)
-            if self._driven is not None:
-                self._driven.set(moment)
+            view = view_matrices(self.camera, size)
+            self._driven.set(moment)
             begun = perf_counter()
             with activity.limited_draw():
-                options: dict[str, Any] = {"moment": part, "moments": len(each), "timed": self.expanded.options.timed}
-                found = self.runner.run(number, moment, 1.0 / fps, scene, view, **options)
+                found = self.runner.run(
+                    number, moment, 1.0 / options.fps, scene, view, moment=part, moments=len(each), timed=options.timed
+                )
                 if found is None:
                     self.gpu.device.ctx.finish()
                     found = FrameTimes((perf_counter() - begun) * 1e3, (), self.runner.ran)
                 times.append(found)
         _NOTE_DONE()
-        if len(times) == 1:
-            return times[0]
         steps = tuple(step for found in times for step in found.steps)
         return FrameTimes(sum(found.frame_ms for found in times), steps, sum(found.ran for found in times))
 
@@ -170,29 +167,26 @@ class Drawing(Struct, eq=False, dict=True):
 
     def read(self) -> Frame:
         """Read back the requested outputs of the last frame."""
-        linked, plan = self.expanded.linked, self.executable.plan
-        graph = linked.graph
-        resources = plan.schedule.outputs
-        infos = {}
+        graph, options, plan = self.expanded.linked.graph, self.expanded.options, self.executable.plan
+        infos, arrays = {}, {}
         transparent = any(getattr(node.node, "transparent", False) is True for node in graph.nodes)
         for name, port in self.expanded.requests.items():
-            info = _output_info(name, port, graph.textures[port.end].semantic, plan.resources[resources[name]].desc)
+            id = plan.schedule.outputs[name]
+            info = _output_info(name, port, graph.textures[port.end].semantic, plan.resources[id].desc)
             infos[name] = replace(info, transparent=transparent and info.semantic == "display_color")
+            arrays[name] = self.runner.read(id, mip=port.mip or 0, layer=port.layer, stencil=port.stencil)
         return Frame(
             number=self.number,
             pipeline=graph.name,
             size=graph.size,
-            arrays={
-                name: self.runner.read(resources[name], mip=port.mip or 0, layer=port.layer, stencil=port.stencil)
-                for name, port in self.expanded.requests.items()
-            },
+            arrays=arrays,
             infos=infos,
             device=self.gpu.device.as_json(),
             types={node: graph[node].type.name for node in self._rendering_nodes},
             memory=plan.memory.as_json(),
             culled=dict(plan.schedule.culled),
             metadata=self._metadata
-            | frame_metadata(self.number, self.expanded.options.fps, self.expanded.options.subframes)
+            | frame_metadata(self.number, options.fps, options.subframes)
             | self._turned_camera(),
             times=tuple(self.times),
             warnings=(*dict.fromkeys(self.gpu.cache.image_warnings), *self._frame_warnings(), *self._ray_notes),
@@ -209,11 +203,11 @@ class Drawing(Struct, eq=False, dict=True):
     def _frame_warnings(self) -> Iterator[Problem]:
         """Yield warnings about frames that show less than was asked for."""
         options, graph = self.expanded.options, self.expanded.linked.graph
-        node, text = self.runner.jittering, ""
-        if node is not None and options.frames == range(1, 2):
+        is_first = options.frames == range(1, 2)
+        if (node := self.runner.jittering) is not None and is_first:
             text = f"'{node}' accumulates over frames, but only frame 1 was rendered; --frames 16-16 shows more"
             yield Problem("RG620", text, Place(graph.name), severity="warning")
-        elif graph.facts.camera.shutter and self.executable.uses_previous and options.frames == range(1, 2):
+        elif graph.facts.camera.shutter and self.executable.uses_previous and is_first:
             text = "motion is measured from frame to frame, but only frame 1 was rendered; --frames 2-2 shows it"
             yield Problem("RG627", text, Place(graph.name), severity="warning")
         if options.subframes > 1 and not (self.camera is None or self.camera.shutter):
@@ -222,8 +216,7 @@ class Drawing(Struct, eq=False, dict=True):
 
     @cached_property
     def _ray_notes(self) -> tuple[Problem, ...]:
-        types = {node.id: node.type for node in self.expanded.linked.graph.nodes}
-        return tuple(ray_warnings(self.executable.plan.schedule.steps, types))
+        return tuple(ray_warnings(self.executable.plan.schedule.steps, self.expanded.linked.node_types))
 
     @cached_property
     def _rendering_nodes(self) -> tuple[str, ...]:

@@ -98,10 +98,9 @@ class GpuCache:
         """Compile a plan, and cache it in place of the least recently used ones."""
         self._save()
         linked, needed = planned.linked, planned.plan.memory.allocated_bytes
-        types = {node.id: node.type for node in linked.graph.nodes}
         self._make_room(needed)
         check_memory(self._device, needed, linked.selection.allowed("plan").get("memory"))
-        views, poison = planned.expansion.views, planned.options.poison
+        types, views, poison = linked.node_types, planned.expansion.views, planned.options.poison
         try:
             with stamps.track_reads() as files:
                 executable = compile_plan(

@@ -199,9 +199,9 @@ def check(linked: Linked) -> Planned:
     from rendergraph.program import check_texts, ray_warnings
 
     planned = plan(expand(linked))
-    types = {node.id: node.type for node in linked.graph.nodes}
-    warnings = check_texts(planned.plan.schedule.steps, types, planned.plan.resources, planned.expansion.views)
-    return replace(planned, warnings=(*warnings, *ray_warnings(planned.plan.schedule.steps, types)))
+    steps, types = planned.plan.schedule.steps, linked.node_types
+    warnings = check_texts(steps, types, planned.plan.resources, planned.expansion.views)
+    return replace(planned, warnings=(*warnings, *ray_warnings(steps, types)))
 
 
 def check_profile(planned: Planned) -> None:
@@ -209,9 +209,8 @@ def check_profile(planned: Planned) -> None:
     from rendergraph.program.limits import beyond_guaranteed
     from rendergraph.scene.pack import pack
 
-    types = {node.id: node.type for node in planned.linked.graph.nodes}
-    scene = planned.linked.scene
-    if problems := beyond_guaranteed(planned.plan, planned.expansion.views, types, scene, pack(scene)):
+    views, types, scene = planned.expansion.views, planned.linked.node_types, planned.linked.scene
+    if problems := beyond_guaranteed(planned.plan, views, types, scene, pack(scene)):
         raise InputError(problems)
 
 

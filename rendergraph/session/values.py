@@ -12,7 +12,7 @@ from rendergraph.textures import FORMATS, TextureDesc
 
 if TYPE_CHECKING:
     from rendergraph.allocate import ResourcePlan
-    from rendergraph.catalog import Catalog
+    from rendergraph.catalog import Catalog, NodeType
     from rendergraph.errors import Problem
     from rendergraph.expand import Expansion
     from rendergraph.link import Endpoint, Graph
@@ -62,6 +62,11 @@ class Linked(Resolved, frozen=True, eq=False, kw_only=True):
     scene: Scene
     graph: Graph
     missing: tuple[Problem, ...] = ()
+
+    @property
+    def node_types(self) -> dict[str, NodeType]:
+        """The types of all nodes by id."""
+        return {node.id: node.type for node in self.graph.nodes}
 
     @property
     def warnings(self) -> tuple[Problem, ...]:
