@@ -79,16 +79,13 @@ def replay_reads(stamps: Stamps) -> None:
 @contextmanager
 def track_reads() -> Iterator[dict[str, Stamp]]:
     """Collect the reads in the block, even if it fails; outer collections get them, too."""
-    outer = _READ.get()
     read: dict[str, Stamp] = {}
     token = _READ.set(read)
     try:
         yield read
     finally:
         _READ.reset(token)
-        if outer is not None:
-            for path, state in read.items():
-                outer.setdefault(path, state)
+        replay_reads(read)
 
 
 def modified(stamps: Stamps) -> list[Path]:

@@ -142,16 +142,8 @@ def check_packages(needed: Mapping[str, tuple[str, str]], worker: str) -> InputE
 def relocate_selection(selection: Selection, root: Path | None) -> Selection:
     if root is None:
         return selection
-    source = selection.source
-    return replace(
-        selection,
-        source=source if isinstance(source, str) and "\n" in source else _relocated(source, root),
-        scene=None if selection.scene is None else str(_relocate(Path(selection.scene), root)),
-        environment=None if selection.environment is None else _relocate(selection.environment, root),
-        patches=tuple(_relocated(each, root) for each in selection.patches),
-        asset_roots=tuple(_relocate(each, root) for each in selection.asset_roots),
-        plugins=tuple(_relocate(each, root) for each in selection.plugins),
-    )
+    names = ("source", "scene", "environment", "patches", "asset_roots", "plugins")
+    return replace(selection, **{name: _relocated(getattr(selection, name), root) for name in names})
 
 
 def _relocate(path: Path, root: Path) -> Path:
@@ -162,11 +154,12 @@ def _relocated(value: Any, root: Path) -> Any:
     """Return a Python value with each absolute path in it, such as that of an array, moved below a worker's folder."""
     if isinstance(value, Mapping):
         return {key: _relocated(child, root) for key, child in value.items()}
-    if isinstance(value, list):
-        return [_relocated(child, root) for child in value]
+    if isinstance(value, list | tuple):
+        return type(value)(_relocated(child, root) for child in value)
     if isinstance(value, Path):
         return _relocate(value, root)
-    return str(_relocate(Path(value), root)) if isinstance(value, str) and value.startswith("/") else value
+    is_path = isinstance(value, str) and value.startswith("/") and "\n" not in value
+    return str(_relocate(Path(value), root)) if is_path else value
 
 
 def map_remote_paths(error: RendergraphError, root: Path | None) -> RendergraphError:

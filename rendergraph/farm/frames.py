@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
-from msgspec import structs
+from msgspec import Struct, structs
 
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.farm.bundle import relocate_selection
@@ -28,8 +28,7 @@ LONGEST_CHUNK = 64
 """Frames of a chunk: the work that is lost with a worker."""
 
 
-@dataclass(frozen=True)
-class FrameFile:
+class FrameFile(Struct, frozen=True):
     """A file of each frame, of an output or a tap; without a suffix bare pixels, as a video needs them."""
 
     name: str
@@ -37,8 +36,7 @@ class FrameFile:
     raw: bool
 
 
-@dataclass(frozen=True, eq=False)
-class RenderedFrame:
+class RenderedFrame(Struct, frozen=True, eq=False):
     """A frame's files: encoded, or as pixels 0…255 of shape (height, width, 3 or 4)."""
 
     number: int

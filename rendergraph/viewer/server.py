@@ -302,9 +302,7 @@ class Server:
         self._wake.set()
 
     def _broadcast(self, kind: str, facts: Mapping[str, Any], files: Mapping[str, bytes] | None = None) -> None:
-        message: bytes | str = _text(kind, facts) if files is None else _pack(kind, facts, files)
-        if kind in ("state", "pipeline", "picture", "thumbnails", "against", "problems"):
-            self._last[kind] = message
+        self._last[kind] = message = _text(kind, facts) if files is None else _pack(kind, facts, files)
         for page in self._pages:
             page.put(kind, message)
 
