@@ -51,18 +51,11 @@ class Link(Struct, frozen=True):
 
 def format_texture(desc: TextureDesc) -> str:
     """Return `rgba16f 1280×720`, with layers, mips and samples if there are several."""
-    text = f"{desc.format} {desc.width}×{desc.height}"
-    if desc.kind == "texture_cube":
-        text += " cube"
-    elif desc.kind == "texture3d":
-        text += f"×{desc.layers}"
-    elif desc.kind == "texture2d_array":
-        text += f" {desc.layers} layer{'s' if desc.layers != 1 else ''}"
-    if desc.mips > 1:
-        text += f" {desc.mips} mips"
-    if desc.samples > 1:
-        text += f" {desc.samples} samples"
-    return text
+    several = f" {desc.layers} layer{'s' if desc.layers != 1 else ''}"
+    layers = {"texture_cube": " cube", "texture3d": f"×{desc.layers}", "texture2d_array": several}.get(desc.kind, "")
+    mips = f" {desc.mips} mips" if desc.mips > 1 else ""
+    samples = f" {desc.samples} samples" if desc.samples > 1 else ""
+    return f"{desc.format} {desc.width}×{desc.height}{layers}{mips}{samples}"
 
 
 def info_of(graph: Graph, node: str, port: str) -> TextureInfo | None:

@@ -183,11 +183,10 @@ def _grid(layers: Bytes) -> Bytes:
     count, height, width, channels = layers.shape
     columns = math.ceil(math.sqrt(count))
     rows = math.ceil(count / columns)
-    sheet = np.zeros((rows * height, columns * width, channels), dtype=np.uint8)
-    for index in range(count):
-        top, left = index // columns * height, index % columns * width
-        sheet[top : top + height, left : left + width] = layers[index]
-    return sheet
+    cells = np.zeros((rows * columns, height, width, channels), np.uint8)
+    cells[:count] = layers
+    by_place = cells.reshape(rows, columns, height, width, channels)
+    return by_place.swapaxes(1, 2).reshape(rows * height, columns * width, channels)
 
 
 def contact_sheet(pictures: Sequence[tuple[Bytes, str, str]]) -> Bytes:

@@ -8,9 +8,9 @@ from rendergraph.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from rendergraph.session.frame import Frame, OutputInfo
-    from rendergraph.session.gpu import Session
     from rendergraph.session.pipeline import Pipeline, load, loads
     from rendergraph.session.selection import RenderOptions, Selection
+    from rendergraph.session.session import Session
 
 __all__ = ["Frame", "OutputInfo", "Pipeline", "RenderOptions", "Selection", "Session", "load", "loads"]
 
@@ -20,6 +20,6 @@ __getattr__, __dir__ = lazy_exports(
         "frame": ("Frame", "OutputInfo"),
         "pipeline": ("Pipeline", "load", "loads"),
         "selection": ("RenderOptions", "Selection"),
-        "gpu": ("Session",),
+        "session": ("Session",),
     },
 )

@@ -130,16 +130,13 @@ class ViewState:
     def __post_init__(self) -> None:
         self._last_camera: Camera | None = None  # camera of the last picture
         self._sphere: cameras.Sphere = ((0.0, 0.0, 0.0), 1.0)
-        self._others: dict[str, Selection] = {"as opened": self.opened}
-        self._other: str | None = None
+        self._others = dict([("as opened", self.opened), *([self.against] if self.against else [])])
+        self._other = self.against[0] if self.against else None
         self._snapshots = 0
         self._own = editing.own_file(self.opened)
         self._disk = ""  # text of the opened file when its edits began or when it was written
         self._saved = self.edits.state
         self._written: set[Path] = set()  # files that were saved from here
-        if self.against is not None:
-            self._others[self.against[0]] = self.against[1]
-            self._other = self.against[0]
 
     @property
     def selection(self) -> Selection:
@@ -247,7 +244,7 @@ class ViewState:
             pipeline = PipelineText(text, path, Catalog.discover(self.opened.plugins))
             pipeline.view("page", {"frame": int(self.edits.current[FRAME])})
             text = pipeline.text
-        return text, editing.difference(before, text, path.name), _digest(before)
+        return text, editing.difference(before, text, path.name), hashlib.sha256(before.encode()).hexdigest()
 
     def save(self, name: object, digest: str) -> str:
         """Write the file and return its text; `digest` identifies the contents of the opened file that it replaces."""
@@ -402,10 +399,6 @@ def _read(path: Path) -> str:
         return path.read_text("utf-8-sig", "replace")
     except OSError:  # it was deleted; saving creates it again
         return ""
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def write_new(path: Path, text: str) -> None:
