@@ -277,11 +277,10 @@ class WorkerSetup(WorkerPlugin):
         self._bundle = ""
         self._folder = Path(tempfile.mkdtemp(prefix="rendergraph-", dir=worker.local_directory))
         (self._folder / "stored").mkdir()
-        address = str(worker.address)
         number = worker.name if isinstance(worker.name, int) else 0
         device = self._devices[number % len(self._devices)]
-        self._process = WorkerProcess(address, device, timeout=self._timeout)
-        self.error = check_packages(self._packages, address)
+        self._process = WorkerProcess(str(worker.address), device, timeout=self._timeout)
+        self.error = check_packages(self._packages, str(worker.address))
 
     def teardown(self, worker: Any) -> None:
         self._process.kill()
@@ -297,7 +296,12 @@ class WorkerSetup(WorkerPlugin):
             root = self._folder / bundle.digest[:16]
             if bundle.digest != self._bundle:
                 self._process.kill()
-                self._write(bundle, root, files)
+                for digest, content in files.items():
+                    path = self._folder / "stored" / digest
+                    if not path.exists():
+                        path.write_bytes(content)
+                bundle.write(root, self._folder / "stored")
+                self._bundle = bundle.digest
             messages: list[tuple[str, Any]] = []
             try:
                 self._process.send(
@@ -308,14 +312,6 @@ class WorkerSetup(WorkerPlugin):
             except RendergraphError as error:
                 messages.append(("lost", error))
             return [message for message in messages if message[0] != "ready"]
-
-    def _write(self, bundle: Bundle, root: Path, files: Mapping[str, bytes]) -> None:
-        for digest, content in files.items():
-            path = self._folder / "stored" / digest
-            if not path.exists():
-                path.write_bytes(content)
-        bundle.write(root, self._folder / "stored")
-        self._bundle = bundle.digest
 
 
 def run_task(

@@ -234,20 +234,18 @@ class Shown:
 
 
 def shown(
-    array: npt.NDArray[Any],
+    array: Pixels,
     name: str,
-    semantic: str,
-    encoding: str | None,
-    *,
-    layer: int | None = None,
-    channel: int | None = None,
-    low: float | None = None,
-    high: float | None = None,
+    info: TexelInfo,
+    layer: int | None,
+    channel: int | None,
+    low: float | None,
+    high: float | None,
 ) -> Shown:
     """Return a texture as a picture; see `Frame.show`."""
     if array.ndim == 4:
         layer = 0 if layer is None and len(array) == 1 else layer
-        if layer is None and (channel is not None or semantic not in _COLORS):
+        if layer is None and (channel is not None or info.semantic not in _COLORS):
             raise _mistake(f"'{name}' has {len(array)} layers; choose one: layer=0")
     elif layer not in (None, 0):
         raise _mistake(f"'{name}' has no layers, so there is no layer {layer}")
@@ -256,8 +254,8 @@ def shown(
     if channel is not None:
         array, name = _chosen(array, -1, channel, name, "channel")
         array = array[..., None]
-    elif semantic in _COLORS and array.shape[-1] > 1:
-        return Shown(name, viewable(array, semantic, encoding))
+    elif info.semantic in _COLORS and array.shape[-1] > 1:
+        return Shown(name, viewable(array, info.semantic, info.encoding))
     elif array.shape[-1] > 1:
         raise _mistake(f"'{name}' has {array.shape[-1]} channels; choose one: channel=0")
     values = array[..., 0].astype(np.float64)

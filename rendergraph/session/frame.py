@@ -241,9 +241,7 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
         """
         from rendergraph.images import shown
 
-        array, info = self._array(name), self.infos[name]
-        part = {"layer": layer, "channel": channel, "low": low, "high": high}
-        return shown(array, name, info.semantic, info.encoding, **part)  # type: ignore[arg-type]
+        return shown(self._array(name), name, self.infos[name], layer, channel, low, high)
 
     def _repr_png_(self) -> bytes:
         from rendergraph.images import Saved, encoded, output_for

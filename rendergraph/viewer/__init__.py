@@ -86,11 +86,8 @@ def view(
     require(*EXTRA)
     from rendergraph.viewer.server import Server  # needs the extra
 
-    found = as_pipeline(pipeline)
-    other = None
-    if against is not None:
-        compared = as_pipeline(against)
-        other = Path(compared.selection.label).stem, compared.selection
-    state = ViewState(found.selection, Path.cwd(), against=other)
+    other = None if against is None else as_pipeline(against).selection
+    compared = None if other is None else (Path(other.label).stem, other)
+    state = ViewState(as_pipeline(pipeline).selection, Path.cwd(), against=compared)
     server = Server(state, RenderProcess(device), port=port)
     return Viewer(server.url, server.start(), state.keep, height)
