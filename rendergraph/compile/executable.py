@@ -6,12 +6,13 @@ writes only the others. A changed parameter only reassembles the lists: no GL ob
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 from functools import cached_property
 from itertools import chain, pairwise
 from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct, field
+from msgspec.structs import replace
 
 from rendergraph import activity
 from rendergraph.compile.checks import uniform_mismatch
@@ -25,6 +26,7 @@ from rendergraph.gl.state import Pieces, changes
 from rendergraph.program import prefix, used_blocks, used_names
 from rendergraph.schedule.dependencies import StepKey, touched_ids
 from rendergraph.steps import Read, Step, UniformValue
+from rendergraph.steps.model import FunctionBinding
 
 if TYPE_CHECKING:
     import moderngl
@@ -42,10 +44,10 @@ if TYPE_CHECKING:
 _MOST_PARTS = 64
 """Maximum number of cached lists of some of the steps."""
 
-
 _OF_INSTANCES = {
     "scene_instance_block": "instances",
-    **dict.fromkeys(("scene_previous_block", "scene_previous_position_block"), "instances before"),
+    "scene_previous_block": "instances before",
+    "scene_previous_position_block": "instances before",
 }
 """Blocks of the scene's data that change together with other sources."""
 
@@ -104,10 +106,9 @@ class CompiledStep(Struct, eq=False):
     """A step of one parity.
 
     Attributes:
-        before: framebuffer, clears.
+        before: framebuffer, clears, begins of queries and conditional rendering.
         sorted: depth-sorted draws, instead of `draws`.
-        after: barriers, poison.
-        watched: calls before and after the draws: occlusion queries and conditional rendering.
+        after: ends of queries and conditional rendering, barriers, poison.
         name: the step's name, as in plans.
     """
 
@@ -116,7 +117,6 @@ class CompiledStep(Struct, eq=False):
     draws: list[Draw] = field(default_factory=list)
     sorted: SortedDraws | None = None
     after: list[Call] = field(default_factory=list)
-    watched: tuple[list[Call], list[Call]] = field(default_factory=lambda: ([], []))
     name: str = ""
 
     @property
@@ -213,13 +213,13 @@ class Executable(Struct, eq=False, dict=True):
         """The names of each node's uniforms, including those of steps that are left out."""
         found: dict[str, set[str]] = {}
         for step in self.recorded_steps:
-            for node, uniforms in ((step.node, step.uniforms), *((one.node, one.uniforms) for one in step.functions)):
-                found.setdefault(node, set()).update(name for name, _ in uniforms)
+            for _, one in _with_functions(step):
+                found.setdefault(one.node, set()).update(dict(one.uniforms))
         return found
 
     @property
     def programs(self) -> set[Program]:
-        return {draw.program for steps in self.steps for step in steps for draw in step.all_draws}
+        return {draw.program for step in chain.from_iterable(self.steps) for draw in step.all_draws}
 
     def invalidate(self) -> None:
         """Make the next frame run every step, kept ones included: no frame has run yet, or the last one failed."""
@@ -257,15 +257,15 @@ class Executable(Struct, eq=False, dict=True):
     def cells(self, node: str, name: str) -> list[_Cell]:
         """Return the cells of a node's uniform in programs that run in every frame, for `write_uniform`."""
         if (node, name) not in self._cells:
-            found = [
+            found = self._cells[node, name] = [
                 _Cell(compiled.step.key, draw, before + name)
-                for steps in self.steps
-                for compiled in steps
-                for before, kept in _uniforms_of(compiled.step, node)
-                for draw in (compiled.all_draws if name in kept and compiled.step.key not in self.kept else ())
+                for compiled in chain.from_iterable(self.steps)
+                if compiled.step.key not in self.kept
+                for before, one in _with_functions(compiled.step)
+                if one.node == node and name in dict(one.uniforms)
+                for draw in compiled.all_draws
                 if before + name in draw.program.uniforms
             ]
-            self._cells[node, name] = found
             if found:
                 self.assemble()
         return self._cells[node, name]
@@ -357,21 +357,24 @@ class Executable(Struct, eq=False, dict=True):
 
         Call it after `steps_for_frame`, which decides which kept steps are due.
         """
-        keys = [compiled.step.key for compiled in self.steps[0]]
-        positions = tuple(at for at, key in enumerate(keys) if key not in self.kept or key in self.due)
+        positions, end = self._positions(self.due), len(self.steps[0])
         key = self.parity, (-1, *positions)
         if key not in self._parts:
             found: list[FrameStep] = []
-            edges = [0, *(at for at in sorted(stops) if at), len(keys)]
-            for low, high in pairwise(edges):
+            for low, high in pairwise([0, *(at for at in sorted(stops) if at), end]):
                 part = self._listed(self.parity, [at for at in positions if low <= at < high])
                 if low in stops and part:
-                    part[0] = FrameStep(part[0].step, (stops[low], *part[0].calls), part[0].timer)
+                    part[0] = replace(part[0], calls=(stops[low], *part[0].calls))
                 found += part
-            if len(keys) in stops:
-                found[-1] = FrameStep(found[-1].step, (*found[-1].calls, stops[len(keys)]), found[-1].timer)
+            if end in stops:
+                found[-1] = replace(found[-1], calls=(*found[-1].calls, stops[end]))
             self._parts[key] = found
         return self._parts[key]
+
+    def _positions(self, due: Container[StepKey]) -> list[int]:
+        """Return the positions of all steps but the kept ones that are not due."""
+        keys = (compiled.step.key for compiled in self.steps[0])
+        return [at for at, key in enumerate(keys) if key not in self.kept or key in due]
 
     @cached_property
     def _kept_sources(self) -> dict[StepKey, frozenset[Source]]:
@@ -386,16 +389,14 @@ class Executable(Struct, eq=False, dict=True):
         resources, found = self.plan.resources, []
         for compiled in self.steps[0]:
             step = compiled.step
-            blocks = {
-                b for draw in compiled.all_draws for text in draw.program.texts.values() for b in used_blocks(text)
-            }
+            texts = (text for draw in compiled.all_draws for text in draw.program.texts.values())
+            blocks = set().union(*map(used_blocks, texts))
             views: dict[str, Source] = {"camera_block": ("view", CAMERA), **_OF_INSTANCES}
             if step.view is not None:
                 views["pass_view_block"] = "view", step.view
                 views["previous_pass_view_block"] = "view before", step.view
-            for before, read in named(step):
-                table = resources[read.resource].view
-                if table is not None:
+            for before, read in prefixed_reads(step):
+                if (table := resources[read.resource].view) is not None:
                     views[f"{before}{read.name}_view_block"] = "view before" if read.previous else "view", table
                     views[f"{before}previous_{read.name}_view_block"] = "view before", table
             sources = {views.get(block, block) for block in blocks}
@@ -446,14 +447,10 @@ class Executable(Struct, eq=False, dict=True):
         def writes(draw: Draw) -> list[Call]:
             own: list[Call] = []
             for name, value in draw.uniforms.items():
-                if cells and (cell := cells.get((id(draw), name))) is not None:
-                    own.append(cell)
-                    continue
                 key = (draw.program.glo, name)
-                if key not in shared and key in written:
-                    continue
-                write = draw.program.writer(name, value)
-                if write is not None:
+                if (cell := cells.get((id(draw), name))) is not None:
+                    own.append(cell)
+                elif (key in shared or key not in written) and (write := draw.program.writer(name, value)):
                     written.add(key)
                     (own if key in shared else self.statics).append(write)
             return own
@@ -463,7 +460,7 @@ class Executable(Struct, eq=False, dict=True):
             found: list[FrameStep] = []
             for position in positions:
                 compiled, timer = self.steps[parity][position], self.timers[position]
-                calls: list[Call] = [*compiled.before, *compiled.watched[0]]
+                calls = list(compiled.before)
                 last = found[-1].calls[-1:] if found else ()
                 if calls and last and calls[0] is last[0]:
                     del calls[0]  # one barrier is enough between two steps that store
@@ -481,17 +478,12 @@ class Executable(Struct, eq=False, dict=True):
                     state = None
                 doing = f"drawing step '{compiled.name}'"
                 begin = activity.note(doing if wait else f"{doing} or a step before it")
-                calls = [begin, *calls, *compiled.watched[1], *compiled.after]
+                calls = [begin, *calls, *compiled.after, *([self.device.ctx.finish] if wait else [])]
                 found.append(FrameStep(compiled.step, tuple(calls), timer))
-            if wait:
-                finish = self.device.ctx.finish
-                found = [FrameStep(step.step, (*step.calls, finish), step.timer) for step in found]
             return found
 
         def all_but_kept(due: Container[StepKey], *, wait: bool = False) -> list[list[FrameStep]]:
-            keys = [compiled.step.key for compiled in self.steps[0]]
-            positions = [at for at, key in enumerate(keys) if key not in self.kept or key in due]
-            return [listed(parity, positions, wait=wait) for parity in range(len(self.steps))]
+            return [listed(parity, self._positions(due), wait=wait) for parity in range(len(self.steps))]
 
         # Drivers run commands asynchronously. The first frame waits for each step, so that a hanging one can be named.
         wait = activity.draw_seconds() > 0
@@ -508,7 +500,7 @@ class Executable(Struct, eq=False, dict=True):
         changed = self.changed(values)
         self.touched |= {("step", key) for key in changed}
         self.due = self._with_dependents(self.due | (changed & self.kept.keys()))
-        for compiled in (c for steps_of in self.steps for c in steps_of):
+        for compiled in chain.from_iterable(self.steps):
             step = values[compiled.step.key]
             compiled.step = step
             if step.key in self.kept:
@@ -539,35 +531,27 @@ class Executable(Struct, eq=False, dict=True):
     def release(self) -> None:
         """Free what it owns; programs and scenes belong to the session."""
         self.vertex_arrays()
-        owned: list[Any] = [self.memory, self.views, *self.buffers, *self.timers, *self.occlusion_queries]
-        owned += [self.means] if self.means is not None else []
-        for each in owned:
-            each.release()
+        for each in (self.memory, self.views, *self.buffers, *self.timers, *self.occlusion_queries, self.means):
+            if each is not None:
+                each.release()
         self.timers.clear()
         self.occlusion_queries.clear()
 
 
-def named(step: Step) -> list[tuple[str, Read]]:
+def _with_functions(step: Step) -> list[tuple[str, Step | FunctionBinding]]:
+    """Return a step and the functions that it calls, each with the prefix of its names in the program text."""
+    return [("", step), *((prefix(function.node), function) for function in step.functions)]
+
+
+def prefixed_reads(step: Step) -> list[tuple[str, Read]]:
     """Return the reads of a step and of the functions that it calls, each with its prefix in the program text."""
-    found = [("", read) for read in step.reads]
-    return found + [(prefix(function.node), read) for function in step.functions for read in function.reads]
+    return [(before, read) for before, part in _with_functions(step) for read in part.reads]
 
 
 def step_uniforms(step: Step) -> dict[str, Any]:
     """Return a step's uniforms and, under prefixed names, those of the functions that it calls."""
-    values: dict[str, Any] = dict(step.uniforms)
-    for function in step.functions:
-        values |= {prefix(function.node) + name: value for name, value in function.uniforms}
-    if step.view_index is not None:
-        values["view_index"] = step.view_index
-    return values
-
-
-def _uniforms_of(step: Step, node: str) -> Iterator[tuple[str, Container[str]]]:
-    """Yield the prefix of a node's uniforms in a step's program, and their names."""
-    if step.node == node:
-        yield "", dict(step.uniforms)
-    yield from ((prefix(node), dict(each.uniforms)) for each in step.functions if each.node == node)
+    values = {before + name: value for before, part in _with_functions(step) for name, value in part.uniforms}
+    return values if step.view_index is None else {**values, "view_index": step.view_index}
 
 
 def _differing(draws: Iterable[Draw]) -> set[tuple[int, str]]:

@@ -14,8 +14,8 @@ from msgspec.structs import replace
 from rendergraph import activity
 from rendergraph.allocate import ResourcePlan
 from rendergraph.catalog import NodeType
-from rendergraph.compile.checks import attribute_formats, check_attributes, check_program, layout_for
-from rendergraph.compile.executable import CompiledStep, Draw, Executable, SortedDraws, named, step_uniforms
+from rendergraph.compile.checks import ProgramChecks, attribute_formats, check_attributes, layout_for
+from rendergraph.compile.executable import CompiledStep, Draw, Executable, SortedDraws, prefixed_reads, step_uniforms
 from rendergraph.compile.geometry import GeometryCompiler, MultiDraw
 from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES, SCENE_ATTRIBUTES, GpuScene
 from rendergraph.compile.memory import Call, Memory, Region, TexturePool, clear_target
@@ -181,15 +181,11 @@ class _Compiler(Struct, eq=False, dict=True):
             compiled.before[:0] = calls  # first, because clears may bind another framebuffer
             for draw in compiled.all_draws:
                 draw.uniforms |= {name: unit for name, unit in units.items() if name in draw.program.uniforms}
+        stored = [] if step.kind in ("clear", "upload") else [w for w in step.writes if w.use in ("buffer", "image")]
+        for write in stored:
+            if write.use == "buffer" and write.load == "clear":
+                compiled.before.append(clear_buffer(self.device, self.memory, write, parity))
         self._watch(step, compiled)
-        stored = [
-            write for write in step.writes if write.use in ("buffer", "image") and step.kind not in ("clear", "upload")
-        ]
-        compiled.before += [
-            clear_buffer(self.device, self.memory, write, parity)
-            for write in stored
-            if write.use == "buffer" and write.load == "clear"
-        ]
         if stored and step.kind != "copy":  # OpenGL does not synchronise image and buffer stores
             compiled.before.insert(0, self._barrier)
             compiled.after.append(self._barrier)
@@ -201,15 +197,13 @@ class _Compiler(Struct, eq=False, dict=True):
 
     def _watch(self, step: Step, compiled: CompiledStep) -> None:
         """Add an occlusion query if another step depends on this one, and conditional rendering if this one depends."""
-        first, last = compiled.watched
-        after = self._queries.get((step.node, step.if_drawn)) if step.if_drawn is not None else None
-        if after is not None:
-            first.append(after.begin_conditional)
-        if step.key in self._queries:
-            first.append(self._queries[step.key].start)
-            last.append(self._queries[step.key].stop)
-        if after is not None:
-            last.append(after.end_conditional)
+        condition = self._queries.get((step.node, step.if_drawn)) if step.if_drawn is not None else None
+        if condition is not None:
+            compiled.before.append(condition.begin_conditional)
+            compiled.after.insert(0, condition.end_conditional)
+        if (query := self._queries.get(step.key)) is not None:
+            compiled.before.append(query.start)
+            compiled.after.insert(0, query.stop)
 
     def _fullscreen(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         program, binds, uniforms = self._program(step, parity, {})
@@ -335,7 +329,7 @@ class _Compiler(Struct, eq=False, dict=True):
         if step.view is not None:
             blocks["pass_view_block"] = self.views.binding(step.view)
             before_views["previous_pass_view_block"] = step.view
-        reads = named(step)
+        reads = prefixed_reads(step)
         storage = self.views.first_storage_binding
         buffers: list[Call] = []
         touched: list[tuple[str, Read | Write]] = [*reads, *(("", write) for write in step.writes)]
@@ -397,7 +391,7 @@ class _Compiler(Struct, eq=False, dict=True):
             uniforms[name] = self.units.unit((self.scene.texels(name),), 0, binds)
         cls, resources, sampled = self.types[step.node].cls, self.plan.resources, {*sampled, *materials}
         check_kept_text(step, texts, cls, resources)
-        check_program(step, program, texts, resources, uniforms, blocks, sampled, cls)
+        ProgramChecks(step, program, texts, cls, resources, uniforms, blocks, sampled).run()
         return program, binds, uniforms
 
     def _check_stages(self, step: Step, texts: Mapping[str, StageText]) -> None:
