@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     import moderngl
 
     from rendergraph.allocate import ResourcePlan
-    from rendergraph.compile.culling import SceneView
+    from rendergraph.compile.geometry import SceneView
     from rendergraph.compile.gpu_scene import GpuScene
     from rendergraph.compile.memory import Memory
     from rendergraph.compile.uploads import UploadedValues

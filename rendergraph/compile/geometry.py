@@ -2,27 +2,113 @@
 
 A multi-draw has objects that need no state change: same macros, textures, culling and winding. How many multi-draws
 are needed depends on what the step's shader uses: a depth pass draws all opaque objects in one.
+
+An object's box is culled if it lies entirely outside one plane of the frustum. Boxes are enlarged by the GPU's possible
+rounding, so culling never changes a bit of a picture. Whenever a view has moved, NumPy culls all objects at once; a
+list of draw commands is uploaded only if it has changed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Any
 
 import moderngl
 import numpy as np
+import numpy.typing as npt
 from msgspec import Struct, field
 
-from rendergraph.compile.culling import COMMAND, DrawList, Objects, SceneView
 from rendergraph.compile.executable import Draw, SortedDraws
-from rendergraph.compile.gpu_scene import GpuScene
-from rendergraph.compile.memory import Call
+from rendergraph.compile.gpu_scene import COMMAND, GpuScene, MeshIndices
+from rendergraph.compile.views import ViewBuffers
 from rendergraph.expand import CAMERA
 from rendergraph.program.variants import features, select
 from rendergraph.scene.model import Texture
-from rendergraph.steps import Step
+from rendergraph.scene.pack import Bools, Doubles, PackedScene, reversed_projection
+from rendergraph.steps import Step, ViewMatrices
+from rendergraph.steps.model import DrawOrder
+
+Objects = npt.NDArray[np.int64]
+
+_ROUNDING = 8 * 2.0**-23
+"""Rounding error of clip coordinates and of what they are compared with, relative to the sizes of their terms."""
+
+
+def visible_objects(packed: PackedScene, view: ViewMatrices, *, clamped: bool = False) -> Bools:
+    """Return which objects a view may see, bool (n,): false if an object's box lies outside one plane of the frustum.
+
+    Args:
+        clamped: depth is clamped, so that objects before the near plane or behind the far plane are drawn as well.
+    """
+    x, y, z, w = reversed_projection(view) @ view.view
+    sides = np.stack([w + x, w - x, w + y, w - y, *(() if clamped else (z, w - z))])
+    terms = np.abs(w) + np.abs(np.stack([x, x, y, y, *(() if clamped else (z, z))]))
+    reach = packed.extents + packed.slack
+    inside = packed.centers @ sides[:, :3].T + reach @ np.abs(sides[:, :3]).T + sides[:, 3]
+    slack = (np.abs(packed.centers) + reach) @ terms[:, :3].T + terms[:, 3]
+    return np.asarray((inside + _ROUNDING * slack >= 0).all(axis=1))
+
+
+class DrawList(Struct, eq=False):
+    """Draw commands of some objects; those of visible objects are at the front of a buffer.
+
+    Attributes:
+        indices: the scene's indices, with the commands of all of its objects.
+        objects: the objects that the list draws if all are visible, in the scene's order.
+        changed: called with the drawn objects, in order, whenever they change.
+    """
+
+    buffer: moderngl.Buffer
+    indices: MeshIndices
+    objects: Objects
+    order: DrawOrder
+    changed: Callable[[Objects], object] | None = None
+    drawn: Objects = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def update(self, visible: Bools | None, depths: Doubles) -> None:
+        """Write the commands of visible objects; objects with equal depth keep the scene's order."""
+        objects = self.objects if visible is None else self.objects[visible[self.objects]]
+        if self.order != "scene":
+            far = depths[objects]
+            objects = objects[np.argsort(far if self.order == "front_to_back" else -far, kind="stable")]
+        if np.array_equal(objects, self.drawn):
+            return
+        if len(objects):
+            self.buffer.write(self.indices.commands[objects].tobytes())
+        self.drawn = objects
+        if self.changed is not None:
+            self.changed(objects)
+
+    def draw(self, vertex_array: Any) -> None:
+        if len(self.drawn):
+            vertex_array.render_indirect(self.buffer, self.indices.mode, len(self.drawn))
+
+
+class SceneView(Struct, eq=False):
+    """The lists that are drawn with one view, or with all views of a table if a shader chooses the layer.
+
+    Attributes:
+        table, index: the view; None for all views of the table.
+    """
+
+    table: str
+    index: int | None
+    culls: bool
+    clamped: bool
+    lists: list[DrawList] = field(default_factory=list)
+
+    def cull_and_sort(self, packed: PackedScene, views: ViewBuffers, *, cull: bool) -> None:
+        """Update all lists to the visible objects, sorted by depth along the view's axis."""
+        table = views.current[self.table]
+        chosen = table if self.index is None else (table[self.index],)
+        visible: Bools | None = None
+        if self.culls and cull:
+            visible = np.logical_or.reduce([visible_objects(packed, view, clamped=self.clamped) for view in chosen])
+        depths = -(packed.centers @ chosen[0].view[2, :3] + chosen[0].view[2, 3])
+        for each in self.lists:
+            each.update(visible, depths)
 
 
 class MultiDrawKey(Struct, frozen=True):
@@ -39,47 +125,12 @@ class MultiDraw(Struct, eq=False):
 
     Attributes:
         textures: sampler name to GL texture and sampler.
+        draw: draws them with a vertex array.
     """
 
-    defines: Mapping[str, str]
+    key: MultiDrawKey
     textures: Mapping[str, tuple[int, int]]
-    cull: str
-    clockwise: bool
-    list: DrawList | None
-    mode: int
-
-    def call(self, vertex_array: Any) -> Call:
-        drawn, mode = self.list, self.mode
-        assert drawn is not None
-
-        def call() -> None:
-            if len(drawn.drawn):
-                vertex_array.render_indirect(drawn.buffer, mode, len(drawn.drawn))
-
-        return call
-
-
-class CommandDraw(MultiDraw, eq=False):
-    """Objects drawn by commands that a shader writes, one for each object of the scene.
-
-    Attributes:
-        buffer: the commands.
-        runs: first object and count of each run of consecutive objects that are drawn together.
-    """
-
-    buffer: moderngl.Buffer
-    runs: tuple[tuple[int, int], ...]
-
-    def call(self, vertex_array: Any) -> Call:
-        calls = [partial(vertex_array.render_indirect, self.buffer, self.mode, n, first) for first, n in self.runs]
-        if len(calls) == 1:
-            return calls[0]
-
-        def call() -> None:
-            for each in calls:
-                each()
-
-        return call
+    draw: Callable[[Any], object]
 
 
 class GeometryCompiler(Struct, eq=False):
@@ -94,56 +145,43 @@ class GeometryCompiler(Struct, eq=False):
         objects = select(self.scene.scene, step)
         if not objects:
             return []
-        if step.order == "front_to_back":
-            return [make(multi_draw) for multi_draw in self._grouped(step, objects)]
         if step.order == "back_to_front":
             return self._sorted(step, objects, make)
-        runs: list[tuple[MultiDrawKey, list[int]]] = []
-        for index in objects:
-            key = self._key(step, index)
-            if runs and runs[-1][0] == key:
-                runs[-1][1].append(index)
-            else:
-                runs.append((key, [index]))
-        return [make(self._multi_draw(step, key, members)) for key, members in runs]
+        if step.order == "front_to_back":
+            state = step.state.cull, step.state.front
+            key = (*self._view_key(step), tuple(objects), step.materials, step.topology, *state)
+            if key not in self._multi_draws:
+                groups = self._groups(step, objects)
+                self._multi_draws[key] = [self._listed(step, alike, members) for alike, members in groups.items()]
+            return [make(multi_draw) for multi_draw in self._multi_draws[key]]
+        return [make(self._listed(step, key, members)) for key, members in groupby(objects, partial(self._key, step))]
 
     def by_commands(self, step: Step, buffer: moderngl.Buffer, make: Callable[[MultiDraw], Draw]) -> list[Draw]:
-        """Return draws that take their commands from a buffer, without culling by the step."""
-        groups: dict[MultiDrawKey, list[int]] = {}
-        for index in select(self.scene.scene, step):
-            groups.setdefault(self._key(step, index), []).append(index)
+        """Return draws that take their commands from a buffer, one for each object, without culling by the step."""
         mode, draws = self.scene.indices(step.topology).mode, []
-        for key, members in groups.items():
-            like = self._with_textures(key, None, mode)
-            ordered = sorted(members)
-            starts = [at for at, n in enumerate(ordered) if at == 0 or ordered[at - 1] != n - 1]
-            runs = tuple((ordered[a], b - a) for a, b in pairwise([*starts, len(ordered)]))
-            state = like.defines, like.textures, like.cull, like.clockwise
-            draws.append(make(CommandDraw(*state, None, mode, buffer, runs)))
+        for key, members in self._groups(step, select(self.scene.scene, step)).items():
+            ordered = np.sort(members)
+            runs = [(int(run[0]), len(run)) for run in np.split(ordered, np.flatnonzero(np.diff(ordered) != 1) + 1)]
+            draws.append(make(self._multi_draw(key, partial(_draw_runs, buffer, mode, runs))))
         return draws
 
-    def _grouped(self, step: Step, objects: list[int]) -> list[MultiDraw]:
-        state = step.state.cull, step.state.front
-        key = (*self._view_key(step), tuple(objects), step.materials, step.topology, *state)
-        if key not in self._multi_draws:
-            groups: dict[MultiDrawKey, list[int]] = {}
-            for index in objects:
-                groups.setdefault(self._key(step, index), []).append(index)
-            self._multi_draws[key] = [self._multi_draw(step, alike, members) for alike, members in groups.items()]
-        return self._multi_draws[key]
+    def _groups(self, step: Step, objects: list[int]) -> dict[MultiDrawKey, list[int]]:
+        groups: dict[MultiDrawKey, list[int]] = {}
+        for index in objects:
+            groups.setdefault(self._key(step, index), []).append(index)
+        return groups
 
     def _sorted(self, step: Step, objects: list[int], make: Callable[[MultiDraw], Draw]) -> SortedDraws:
         """Return one part per kind of object over one list of commands, sorted far to near whenever the view moves."""
-        keys = [self._key(step, index) for index in objects]
-        parts = {key: number for number, key in enumerate(dict.fromkeys(keys))}
+        groups = self._groups(step, objects)
         part_of = np.zeros(max(objects) + 1, np.int64)
-        part_of[objects] = [parts[key] for key in keys]
+        for part, members in enumerate(groups.values()):
+            part_of[members] = part
         whole = self._list(step, objects)
-        mode = self.scene.indices(step.topology).mode
-        draws = [make(self._with_textures(key, whole, mode)) for key in parts]
+        draws = [make(self._multi_draw(key, whole.draw)) for key in groups]
 
         def render(part: int, first: int, count: int) -> None:
-            draws[part].vertex_array.render_indirect(whole.buffer, mode, count, first)
+            draws[part].vertex_array.render_indirect(whole.buffer, whole.indices.mode, count, first)
 
         made = SortedDraws(draws, render)
 
@@ -155,20 +193,19 @@ class GeometryCompiler(Struct, eq=False):
         whole.changed = changed
         return made
 
-    def _multi_draw(self, step: Step, key: MultiDrawKey, members: list[int]) -> MultiDraw:
-        return self._with_textures(key, self._list(step, members), self.scene.indices(step.topology).mode)
+    def _listed(self, step: Step, key: MultiDrawKey, members: Iterable[int]) -> MultiDraw:
+        return self._multi_draw(key, self._list(step, members).draw)
 
-    def _with_textures(self, key: MultiDrawKey, drawn: DrawList | None, mode: int) -> MultiDraw:
+    def _multi_draw(self, key: MultiDrawKey, draw: Callable[[Any], object]) -> MultiDraw:
         self.scene.load_images([texture for _, texture in key.textures])
-        found = {name: self.scene.texture(texture) for name, texture in key.textures}
-        return MultiDraw(dict(key.defines), found, key.cull, key.clockwise, drawn, mode)
+        return MultiDraw(key, {name: self.scene.texture(texture) for name, texture in key.textures}, draw)
 
-    def _list(self, step: Step, members: list[int]) -> DrawList:
+    def _list(self, step: Step, members: Iterable[int]) -> DrawList:
         """Return the commands of objects, updated whenever the step's view or an object has moved."""
-        buffer = self.scene.device.ctx.buffer(reserve=len(members) * COMMAND.itemsize)
+        objects = np.array(list(members), np.int64)
+        buffer = self.scene.device.ctx.buffer(reserve=len(objects) * COMMAND.itemsize)
         self.buffers.append(buffer)
-        commands = self.scene.indices(step.topology).commands
-        made = DrawList(buffer, commands, np.array(members, np.int64), step.order)
+        made = DrawList(buffer, self.scene.indices(step.topology), objects, step.order)
         key = self._view_key(step)
         self.views.setdefault(key, SceneView(*key)).lists.append(made)
         return made
@@ -189,3 +226,9 @@ class GeometryCompiler(Struct, eq=False):
             plain = material.alpha_mode == "opaque" and not material.double_sided
             cull = "back" if plain and scene.meshes[placed.mesh].solid else "none"
         return MultiDrawKey(tuple(defines.items()), tuple(found.items()), cull, clockwise)
+
+
+def _draw_runs(buffer: moderngl.Buffer, mode: int, runs: list[tuple[int, int]], vertex_array: Any) -> None:
+    """Draw runs of consecutive objects, each given by its first object and their number."""
+    for first, count in runs:
+        vertex_array.render_indirect(buffer, mode, count, first)

@@ -14,7 +14,6 @@ import numpy.typing as npt
 from msgspec import Struct, field
 from msgspec.structs import replace
 
-from rendergraph.compile.culling import commands
 from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.scene_buffers import INSTANCES, TREE, VERTICES, SceneBuffers, check_size
 from rendergraph.expand import SCENE_DATA
@@ -34,6 +33,12 @@ from rendergraph.textures import TextureDesc, full_mip_count
 
 if TYPE_CHECKING:
     from rendergraph.compile.posing import Posing
+
+COMMAND = np.dtype(
+    [(name, np.uint32) for name in ("count", "instances", "first_index")]
+    + [("base_vertex", np.int32), ("base_instance", np.uint32)]
+)
+"""DrawElementsIndirectCommand."""
 
 DecodeLight = Callable[[ImageSource | MadeImage], npt.NDArray[Any]]
 """Decodes the environment map of a scene."""
@@ -110,7 +115,7 @@ class GpuScene(Struct, eq=False, dict=True):
             if array is not None and array.size:
                 self._streams[name] = (ctx.buffer(array.tobytes()), layout)
         buffer = ctx.buffer(packed.indices.tobytes() or bytes(4))
-        self._indices = {"triangles": MeshIndices(buffer, commands(packed, packed.meshes), moderngl.TRIANGLES)}
+        self._indices = {"triangles": MeshIndices(buffer, _commands(packed, packed.meshes), moderngl.TRIANGLES)}
         self._instances = ctx.buffer(packed.instances.tobytes() or bytes(64))
         stored = storage_blocks(packed, self.device.limits["uniform_block"])
         for block, records in pack.blocks(packed).items():
@@ -249,7 +254,7 @@ class GpuScene(Struct, eq=False, dict=True):
         if topology not in self._indices:
             indices, meshes = pack.with_adjacency(self.packed)
             buffer = self.device.ctx.buffer(indices.tobytes() or bytes(4))
-            self._indices[topology] = MeshIndices(buffer, commands(self.packed, meshes), moderngl.TRIANGLES_ADJACENCY)
+            self._indices[topology] = MeshIndices(buffer, _commands(self.packed, meshes), moderngl.TRIANGLES_ADJACENCY)
         return self._indices[topology]
 
     def vertex_array(self, programs: ProgramCache, program: Program, topology: str) -> Any:
@@ -368,6 +373,16 @@ class GpuScene(Struct, eq=False, dict=True):
             textures.delete(self.device, image)
         for sampler in self._samplers.values():
             self.device.raw.delete("glDeleteSamplers", sampler)
+
+
+def _commands(packed: PackedScene, meshes: Records) -> Records:
+    """Return `COMMAND` records that draw each object of a scene; `meshes` locates its indices."""
+    found = np.zeros(len(packed.object_mesh), COMMAND)
+    of = meshes[packed.object_mesh]
+    for name in ("count", "first_index", "base_vertex"):
+        found[name] = of[name]
+    found["instances"], found["base_instance"] = 1, np.arange(len(found))
+    return found
 
 
 def write_records(buffer: moderngl.Buffer, records: Records, numbers: npt.NDArray[np.int64]) -> None:

@@ -16,7 +16,7 @@ from rendergraph.allocate import ResourcePlan
 from rendergraph.catalog import NodeType
 from rendergraph.compile.checks import ProgramChecks, attribute_formats, check_attributes, layout_for
 from rendergraph.compile.executable import CompiledStep, Draw, Executable, SortedDraws, prefixed_reads, step_uniforms
-from rendergraph.compile.geometry import GeometryCompiler, MultiDraw
+from rendergraph.compile.geometry import GeometryCompiler, MultiDraw, MultiDrawKey
 from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES, SCENE_ATTRIBUTES, GpuScene
 from rendergraph.compile.memory import Call, Memory, Region, TexturePool, clear_target
 from rendergraph.compile.programs import ProgramCache
@@ -276,16 +276,15 @@ class _Compiler(Struct, eq=False, dict=True):
         defines = {"PASS_VIEW_COUNT": view_count(step, self.view_tables), **self.scene.defines}
 
         def make(multi_draw: MultiDraw) -> Draw:
-            program, binds, uniforms = self._program(
-                step, parity, {**defines, **multi_draw.defines}, materials=multi_draw.textures
-            )
-            check_attributes(step, program, SCENE_ATTRIBUTES, self._texts(step, {**defines, **multi_draw.defines}))
+            macros = defines | dict(multi_draw.key.defines)
+            program, binds, uniforms = self._program(step, parity, macros, materials=multi_draw.textures)
+            check_attributes(step, program, SCENE_ATTRIBUTES, self._texts(step, macros))
             for slot, (texture, sampler) in multi_draw.textures.items():
                 uniforms[slot] = self.units.unit((texture,), sampler, binds)
             vertex_array = self.scene.vertex_array(self.programs, program, step.topology)
             self.uses_previous |= any(name in program.object for name in PREVIOUS_ATTRIBUTES)
-            state = self._state(step, depth_default=True, cull=multi_draw.cull, clockwise=multi_draw.clockwise)
-            return Draw(program, uniforms, state, multi_draw.call(vertex_array), binds, vertex_array)
+            state = self._state(step, depth_default=True, key=multi_draw.key)
+            return Draw(program, uniforms, state, partial(multi_draw.draw, vertex_array), binds, vertex_array)
 
         uses: tuple[Read | Write, ...] = (*step.all_reads, *step.writes)
         turns = any(use.use == "buffer" and len(self.plan.placement[use.resource]) == 2 for use in uses)
@@ -461,9 +460,7 @@ class _Compiler(Struct, eq=False, dict=True):
             return Clear(self.device, texture, write.clear, mip=write.mip or 0, layer=write.layer)
         return clear_target(self.device, target, number, texture.desc.format, write.clear)
 
-    def _state(
-        self, step: Step, *, depth_default: bool, cull: str | None = None, clockwise: bool = False
-    ) -> gl_state.Pieces:
+    def _state(self, step: Step, *, depth_default: bool, key: MultiDrawKey | None = None) -> gl_state.Pieces:
         state = step.state
         writes_depth = any(write.use == "depth" for write in step.writes)
         has_depth = writes_depth or any(read.use == "depth_test" for read in step.reads)
@@ -471,11 +468,11 @@ class _Compiler(Struct, eq=False, dict=True):
         if not depth_test and writes_depth and state.depth_write is not False:
             # OpenGL writes no depth if the depth test is off.
             depth_test, state = True, replace(state, depth_func="always")
-        resolved = cull or ("none" if state.cull in ("material", "solid") else state.cull)
-        clockwise = clockwise or state.front == "clockwise"
+        cull = key.cull if key else "none" if state.cull in ("material", "solid") else state.cull
+        clockwise = key.clockwise if key else state.front == "clockwise"
         targets = sum(write.use == "color" for write in step.writes)
         return gl_state.pieces(
-            self.device.raw, state, depth_test=depth_test, cull=resolved, clockwise=clockwise, targets=targets
+            self.device.raw, state, depth_test=depth_test, cull=cull, clockwise=clockwise, targets=targets
         )
 
     def _poison(self, position: int, parity: int) -> list[Call]:

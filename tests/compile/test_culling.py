@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rendergraph.api import Depth, Node, Output, State, Steps, projection
-from rendergraph.compile.culling import visible_objects
+from rendergraph.compile.geometry import visible_objects
 from rendergraph.scene import pack
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.load import load
