@@ -8,7 +8,7 @@ from rendergraph.compile.kept import KeptValues
 from rendergraph.compile.memory import TexturePool
 from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.steps import compile_plan
-from rendergraph.compile.uploads import SCENE_CHANGES
+from rendergraph.compile.transfers import SCENE_CHANGES
 
 __all__ = [
     "SCENE_CHANGES",

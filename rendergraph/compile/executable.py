@@ -32,11 +32,11 @@ if TYPE_CHECKING:
     import moderngl
 
     from rendergraph.allocate import ResourcePlan
+    from rendergraph.compile.bindings import ViewBuffers
     from rendergraph.compile.geometry import SceneView
     from rendergraph.compile.gpu_scene import GpuScene
     from rendergraph.compile.memory import Memory
-    from rendergraph.compile.uploads import UploadedValues
-    from rendergraph.compile.views import ViewBuffers
+    from rendergraph.compile.transfers import UploadedValues
     from rendergraph.gl.device import Device
     from rendergraph.gl.queries import OcclusionQuery, Timer
 

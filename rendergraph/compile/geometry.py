@@ -20,9 +20,9 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Struct, field
 
+from rendergraph.compile.bindings import ViewBuffers
 from rendergraph.compile.executable import Draw, SortedDraws
 from rendergraph.compile.gpu_scene import COMMAND, GpuScene, MeshIndices
-from rendergraph.compile.views import ViewBuffers
 from rendergraph.expand import CAMERA
 from rendergraph.program.variants import features, select
 from rendergraph.scene.model import Texture

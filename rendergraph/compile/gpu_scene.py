@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Callable, Hashable
+from contextlib import ExitStack
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -107,25 +108,40 @@ class GpuScene(Struct, eq=False, dict=True):
     _tree_texture: int = 0
     _posing: Posing | None = None
     _stale_instances: set[int] = set()  # objects that have moved since the previous frame was saved
+    _owned: ExitStack = field(default_factory=ExitStack)
 
     def __post_init__(self) -> None:
-        ctx, packed = self.device.ctx, self.packed
+        packed = self.packed
         for name, (field_name, layout) in _STREAMS.items():
             array = getattr(packed, field_name)
             if array is not None and array.size:
-                self._streams[name] = (ctx.buffer(array.tobytes()), layout)
-        buffer = ctx.buffer(packed.indices.tobytes() or bytes(4))
-        self._indices = {"triangles": MeshIndices(buffer, _commands(packed, packed.meshes), moderngl.TRIANGLES)}
-        self._instances = ctx.buffer(packed.instances.tobytes() or bytes(64))
+                self._streams[name] = (self._buffer(array.tobytes()), layout)
+        self._indices = {"triangles": self._mesh_indices(packed.indices, packed.meshes, moderngl.TRIANGLES)}
+        self._instances = self._buffer(packed.instances.tobytes() or bytes(64))
         stored = storage_blocks(packed, self.device.limits["uniform_block"])
         for block, records in pack.blocks(packed).items():
             if records.size:
-                self._blocks[block] = (ctx.buffer(records.tobytes()), block in stored)
+                self._blocks[block] = (self._buffer(records.tobytes()), block in stored)
         if packed.vertex_orders:
             from rendergraph.compile.posing import Posing  # only for animated meshes
 
             streams = {_STREAMS[name][0]: buffer for name, (buffer, _) in self._streams.items() if name in _POSED}
             self._posing = Posing.make(self.device, self.scene, packed, streams)
+            self._owned.callback(self._posing.release)
+
+    def _buffer(self, content: bytes) -> moderngl.Buffer:
+        buffer = self.device.ctx.buffer(content)
+        self._owned.callback(buffer.release)
+        return buffer
+
+    def _mesh_indices(self, indices: npt.NDArray[Any], meshes: Records, mode: int) -> MeshIndices:
+        """Return an index buffer, with the commands that draw each object; `meshes` locates its indices."""
+        packed = self.packed
+        commands = np.zeros(len(packed.object_mesh), COMMAND)
+        for name in ("count", "first_index", "base_vertex"):
+            commands[name] = meshes[packed.object_mesh][name]
+        commands["instances"], commands["base_instance"] = 1, np.arange(len(commands))
+        return MeshIndices(self._buffer(indices.tobytes() or bytes(4)), commands, mode)
 
     @property
     def light_defines(self) -> dict[str, str]:
@@ -211,6 +227,7 @@ class GpuScene(Struct, eq=False, dict=True):
             images = {key: self._images[texture.image, texture.srgb] for key, texture in used.items()}
             indices = self._indices["triangles"].buffer
             self._data = SceneBuffers.make(self.device, self.scene, self.packed, indices, images)
+            self._owned.callback(self._data.release)
             if self._posing is not None:
                 vertices = self._data.buffers[VERTICES]
                 self._posing.fill(vertices, vertices.size // (4 * len(self.packed.positions)))
@@ -229,13 +246,15 @@ class GpuScene(Struct, eq=False, dict=True):
             trees = self._mesh_trees()
             rows = object_rows(self.packed, self.data.instances["flags"], trees)
             check_size(self.device, TREE, rows.nbytes + trees.rows.nbytes, texel=16)
-            self._tree = trees, self.device.ctx.buffer(rows.tobytes() + trees.rows.tobytes())
+            self._tree = trees, self._buffer(rows.tobytes() + trees.rows.tobytes())
             self._tree_texture = textures.create_texel_buffer(self.device, self._tree[1].glo, "rgba32i")
+            self._owned.callback(self.device.raw.delete, "glDeleteTextures", self._tree_texture)
         return self._tree[1]
 
     def _mesh_trees(self) -> MeshTrees:
-        posing = self._posing
-        packed = self.packed if posing is None else replace(self.packed, positions=posing.positions())
+        packed = self.packed
+        if self._posing is not None:
+            packed = replace(packed, positions=self._posing.positions())
         before = None if self._tree is None else self._tree[0]
         return mesh_trees(self.scene, packed, self.data.instances["flags"], before)
 
@@ -252,9 +271,9 @@ class GpuScene(Struct, eq=False, dict=True):
     def indices(self, topology: str) -> MeshIndices:
         """Return the indices of `triangles`, or of `triangles_adjacency`, which are computed on first use."""
         if topology not in self._indices:
-            indices, meshes = pack.with_adjacency(self.packed)
-            buffer = self.device.ctx.buffer(indices.tobytes() or bytes(4))
-            self._indices[topology] = MeshIndices(buffer, _commands(self.packed, meshes), moderngl.TRIANGLES_ADJACENCY)
+            self._indices[topology] = self._mesh_indices(
+                *pack.with_adjacency(self.packed), mode=moderngl.TRIANGLES_ADJACENCY
+            )
         return self._indices[topology]
 
     def vertex_array(self, programs: ProgramCache, program: Program, topology: str) -> Any:
@@ -278,7 +297,7 @@ class GpuScene(Struct, eq=False, dict=True):
         """Transforms of objects in the previous frame, stored from the first use on."""
         if self._before is None:
             self._stale_instances.clear()
-            self._before = self.device.ctx.buffer(self.packed.instances.tobytes() or bytes(64))
+            self._before = self._buffer(self.packed.instances.tobytes() or bytes(64))
         return self._before
 
     def previous_positions(self) -> moderngl.Buffer:
@@ -289,7 +308,7 @@ class GpuScene(Struct, eq=False, dict=True):
         """Return a buffer with one value per instance: draws start at the object's instance, so one would not do."""
         if name not in self._constants:
             values = np.tile(np.array(_ABSENT[name], np.float32), (max(1, len(self.packed.instances)), 1))
-            self._constants[name] = self.device.ctx.buffer(values.tobytes())
+            self._constants[name] = self._buffer(values.tobytes())
         return self._constants[name], f"{SCENE_ATTRIBUTES[name]}/i"
 
     def texture(self, texture: Texture) -> tuple[int, int]:
@@ -300,29 +319,29 @@ class GpuScene(Struct, eq=False, dict=True):
         if key not in self._samplers:
             is_trilinear = texture.min_filter == "linear_mipmap_linear"
             steps = min(_ANISOTROPY, self.device.limits["anisotropy"]) if is_trilinear else 1
-            self._samplers[key] = textures.create_gl_sampler(self.device, *key, anisotropy=steps)
+            made = self._samplers[key] = textures.create_gl_sampler(self.device, *key, anisotropy=steps)
+            self._owned.callback(self.device.raw.delete, "glDeleteSamplers", made)
         return image, self._samplers[key]
 
     def load_images(self, wanted: list[Texture]) -> None:
         """Decode and upload missing images; decoding runs on all cores."""
-        missing = list(dict.fromkeys((t.image, t.srgb) for t in wanted if (t.image, t.srgb) not in self._images))
+        missing = dict.fromkeys((t.image, t.srgb) for t in wanted if (t.image, t.srgb) not in self._images)
         if not missing:
             return
         from concurrent.futures import ThreadPoolExecutor  # only for scenes with images
 
-        files = [key for key in missing if key[0].generated is None]
         with ThreadPoolExecutor() as pool:
-            for key, pixels in zip(files, pool.map(lambda k: self.decode(*k), files), strict=True):
+            decoding = {key: pool.submit(self.decode, *key) for key in missing if key[0].generated is None}
+            for key in missing:  # generated images need this thread's context
+                pixels = decoding[key].result() if key in decoding else self.decode(*key)
                 self._images[key] = self._upload(pixels, srgb=key[1])
-        for key in missing:
-            if key[0].generated is not None:  # needs this thread's context
-                self._images[key] = self._upload(self.decode(*key), srgb=key[1])
 
     def environment(self) -> GpuTexture:
         """Return the scene's environment map, decoded and uploaded on first use."""
         if self._environment is None:
             assert self.scene.environment is not None  # called only for scenes that have one
             self._environment = self._upload(self.decode_light(self.scene.environment.image), srgb=True)
+            self._owned.callback(textures.delete, self.device, self._environment)
         return self._environment
 
     def resource(self, id: str) -> GpuTexture | moderngl.Buffer:
@@ -353,36 +372,9 @@ class GpuScene(Struct, eq=False, dict=True):
 
     def release(self, programs: ProgramCache) -> None:
         programs.forget(id(self))
-        for buffer, _ in (*self._streams.values(), *self._blocks.values()):
-            buffer.release()
-        for buffer in self._constants.values():
-            buffer.release()
-        for indices in self._indices.values():
-            indices.buffer.release()
-        self._instances.release()
-        if self._data is not None:
-            self._data.release()
-        if self._tree is not None:
-            self._tree[1].release()
-            self.device.raw.delete("glDeleteTextures", self._tree_texture)
-        if self._posing is not None:
-            self._posing.release()
-        if self._before is not None:
-            self._before.release()
-        for image in (*self._images.values(), *([self._environment] if self._environment else [])):
+        for image in self._images.values():
             textures.delete(self.device, image)
-        for sampler in self._samplers.values():
-            self.device.raw.delete("glDeleteSamplers", sampler)
-
-
-def _commands(packed: PackedScene, meshes: Records) -> Records:
-    """Return `COMMAND` records that draw each object of a scene; `meshes` locates its indices."""
-    found = np.zeros(len(packed.object_mesh), COMMAND)
-    of = meshes[packed.object_mesh]
-    for name in ("count", "first_index", "base_vertex"):
-        found[name] = of[name]
-    found["instances"], found["base_instance"] = 1, np.arange(len(found))
-    return found
+        self._owned.close()
 
 
 def write_records(buffer: moderngl.Buffer, records: Records, numbers: npt.NDArray[np.int64]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from functools import cached_property, partial
 from typing import Any
 
@@ -18,7 +19,7 @@ from rendergraph.gl.device import Device
 from rendergraph.gl.memory_objects import MemoryBlock, make_blocks
 from rendergraph.gl.raw import RawGL
 from rendergraph.gl.textures import GpuTexture, texel
-from rendergraph.steps import Read, Write
+from rendergraph.steps import Read, State, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
 
 Call = Callable[[], object]
@@ -74,11 +75,6 @@ class Region(Struct, eq=False):
         raw.glDepthBoundsEXT(*self.depth_bounds)
 
 
-class _PooledTexture(Struct, eq=False):
-    texture: GpuTexture
-    users: int = 0
-
-
 class TexturePool(Struct, eq=False):
     """Textures that several executables share: only one renders at a time, and none reads another's contents.
 
@@ -86,23 +82,24 @@ class TexturePool(Struct, eq=False):
     """
 
     device: Device
-    _pooled: dict[TextureDesc, list[_PooledTexture]] = field(default_factory=dict)
+    _pooled: dict[TextureDesc, list[GpuTexture]] = field(default_factory=dict)
+    _users: Counter[GpuTexture] = field(default_factory=Counter)
 
     def acquire(self, desc: TextureDesc, number: int, label: str) -> GpuTexture:
         """Return the texture with this description and number; numbers start from 0 in each executable."""
         of_desc = self._pooled.setdefault(desc, [])
         if number == len(of_desc):
-            of_desc.append(_PooledTexture(textures.create(self.device, desc, label)))
-        pooled = of_desc[number]
-        pooled.users += 1
-        return pooled.texture
+            of_desc.append(textures.create(self.device, desc, label))
+        self._users[of_desc[number]] += 1
+        return of_desc[number]
 
     def release(self, texture: GpuTexture) -> None:
         """Free a texture when its last user releases it."""
         of_desc = self._pooled[texture.desc]
-        next(pooled for pooled in of_desc if pooled.texture is texture).users -= 1
-        while of_desc and not of_desc[-1].users:  # executables use the lowest numbers
-            textures.delete(self.device, of_desc.pop().texture)
+        self._users[texture] -= 1
+        while of_desc and not self._users[of_desc[-1]]:  # executables use the lowest numbers
+            del self._users[of_desc[-1]]
+            textures.delete(self.device, of_desc.pop())
 
 
 class Memory(Struct, eq=False, dict=True):
@@ -122,41 +119,44 @@ class Memory(Struct, eq=False, dict=True):
     _samplers: dict[Sampler, int] = field(default_factory=dict)
     _framebuffers: dict[tuple[object, ...], moderngl.Framebuffer] = field(default_factory=dict)
     _dummies: dict[tuple[int, bool], moderngl.Renderbuffer] = field(default_factory=dict)
+    _owned: ExitStack = field(default_factory=ExitStack)
 
     def __post_init__(self) -> None:
         numbers: Counter[TextureDesc] = Counter()
-        blocks = [physical for physical in self.plan.physicals if physical.block]
-        descs = [[self._desc(id) for id in physical.members] for physical in blocks]
-        made_blocks = iter(make_blocks(self.device, descs))
+        descs = [[self._desc(id) for id in physical.members] for physical in self.plan.physicals if physical.block]
+        blocks = make_blocks(self.device, descs)
+        for block in blocks:
+            self._owned.callback(block.release)
+        left = iter(blocks)
         try:
             for physical in self.plan.physicals:
                 if physical.block:
-                    self.physicals.append(next(made_blocks))
-                elif self._is_scenes(physical):
+                    self.physicals.append(next(left))
+                elif self.plan.resources[physical.members[0]].role == "scene":
                     self.physicals.append(self.of_scene(physical.members[0]))
                 elif isinstance(physical.desc, BufferDesc):
-                    self.physicals.append(self.device.ctx.buffer(reserve=max(16, physical.desc.bytes)))
+                    buffer = self.device.ctx.buffer(reserve=max(16, physical.desc.bytes))
+                    self._owned.callback(buffer.release)
+                    self.physicals.append(buffer)
                 else:
-                    label = ", ".join(physical.members)
-                    if self._is_kept(physical):
-                        made = textures.create(self.device, physical.desc, label)
-                    else:
-                        made = self.pool.acquire(physical.desc, numbers[physical.desc], label)
-                        numbers[physical.desc] += 1
-                    self.physicals.append(made)
-                    if self.device.ctx.supports_labels:
-                        self.device.ctx.mglo.set_label(_TEXTURE_LABEL, made.glo, label[:200])
+                    self.physicals.append(self._allocated(physical, physical.desc, numbers))
         except BaseException:
-            for block in made_blocks:
-                block.release()
             self.release()
             raise
 
-    def _is_kept(self, physical: Physical) -> bool:
-        return any(self.plan.resources[id].role == "kept" for id in physical.members)
-
-    def _is_scenes(self, physical: Physical) -> bool:
-        return self.plan.resources[physical.members[0]].role == "scene"
+    def _allocated(self, physical: Physical, desc: TextureDesc, numbers: Counter[TextureDesc]) -> GpuTexture:
+        """Return a texture of its own for kept values, or else one of the pool."""
+        label = ", ".join(physical.members)
+        if any(self.plan.resources[id].role == "kept" for id in physical.members):
+            made = textures.create(self.device, desc, label)
+            self._owned.callback(textures.delete, self.device, made)
+        else:
+            made = self.pool.acquire(desc, numbers[desc], label)
+            self._owned.callback(self.pool.release, made)
+            numbers[desc] += 1
+        if self.device.ctx.supports_labels:
+            self.device.ctx.mglo.set_label(_TEXTURE_LABEL, made.glo, label[:200])
+        return made
 
     @cached_property
     def parities(self) -> int:
@@ -170,9 +170,7 @@ class Memory(Struct, eq=False, dict=True):
         if isinstance(base, MemoryBlock):
             return base.textures[desc]
         assert isinstance(base, GpuTexture), f"{resource} is a buffer"
-        if desc.format == base.desc.format:
-            return base
-        return self._view(base, desc.format, None, None)
+        return base if desc.format == base.desc.format else self._view(base, desc.format, None, None)
 
     def _place(self, resource: str, parity: int, previous: bool) -> int:
         places = self.plan.placement[resource]
@@ -197,13 +195,15 @@ class Memory(Struct, eq=False, dict=True):
 
     def sampler(self, sampler: Sampler) -> int:
         if sampler not in self._samplers:
-            self._samplers[sampler] = textures.create_sampler(self.device, sampler)
+            made = self._samplers[sampler] = textures.create_sampler(self.device, sampler)
+            self._owned.callback(self.device.raw.delete, "glDeleteSamplers", made)
         return self._samplers[sampler]
 
     def _view(self, texture: GpuTexture, format: str, mip: int | None, layer: int | None) -> GpuTexture:
         key = (texture.glo, format, mip, layer)
         if key not in self._views:
-            self._views[key] = textures.view(self.device, texture, format=format, mip=mip, layer=layer)
+            made = self._views[key] = textures.view(self.device, texture, format=format, mip=mip, layer=layer)
+            self._owned.callback(textures.delete, self.device, made)
         return self._views[key]
 
     def framebuffer(
@@ -211,29 +211,26 @@ class Memory(Struct, eq=False, dict=True):
         colors: Sequence[Attachment],
         depth: Attachment | None,
         size: tuple[int, int],
-        *,
-        color_mask: tuple[bool, bool, bool, bool] = (True, True, True, True),
-        depth_mask: bool = True,
-        scissor: tuple[int, int, int, int] | None = None,
-        region: tuple[str, int] | None = None,
+        state: State = State(),
+        region: Region | None = None,
     ) -> moderngl.Framebuffer:
-        """Return a framebuffer whose `use()` also sets viewport, masks and scissor.
+        """Return a framebuffer whose `use()` also sets viewport, masks and scissor; a region has one of its own.
 
         moderngl cannot attach wrapped depth textures, mips or layers, so it is made over 1×1 renderbuffers, which raw
         calls then replace by the real attachments.
         """
-        key = (tuple(colors), depth, size, color_mask, depth_mask, scissor, region)
+        depth_mask = state.depth_write is not False
+        key = (tuple(colors), depth, size, state.color_mask, depth_mask, state.scissor, region)
         if key in self._framebuffers:
             return self._framebuffers[key]
+        raw, ctx = self.device.raw, self.device.ctx
         stencil = depth is not None and FORMATS[depth.texture.desc.format].family == "depth_stencil"
         if colors or depth is not None:
-            made = self.device.ctx.framebuffer(
-                [self._dummy(number, depth=False) for number in range(len(colors))],
-                self._dummy(0, depth=True) if depth is not None else None,
-            )
+            dummies = [self._dummy(number, depth=False) for number in range(len(colors))]
+            made = ctx.framebuffer(dummies, self._dummy(0, depth=True) if depth is not None else None)
         else:  # a step that only stores images or buffers
-            made = self.device.ctx.empty_framebuffer(size)
-        raw = self.device.raw
+            made = ctx.empty_framebuffer(size)
+        self._owned.callback(made.release)
         for number, color in enumerate(colors):
             self._attach(made.glo, 0x8CE0 + number, color)
         if depth is not None:
@@ -242,19 +239,15 @@ class Memory(Struct, eq=False, dict=True):
             self._attach(made.glo, 0x821A if stencil else 0x8D00, depth)
         status = raw.glCheckNamedFramebufferStatus(made.glo, 0x8D40)
         if status != 0x8CD5:
-            made.release()
             every = " with ".join(str(target) for target in (*colors, depth) if target is not None)
-            text = (
-                f"the driver does not draw to {every} ({_STATUS.get(status, hex(status))}); "
-                "a float format of the same channels may do"
-            )
-            raise RenderError(Problem("RG617", text))
+            text = f"the driver does not draw to {every} ({_STATUS.get(status, hex(status))}); "
+            raise RenderError(Problem("RG617", f"{text}a float format of the same channels may do"))
         made.viewport = (0, 0, *size)
         if colors:
-            masks: Any = color_mask if len(colors) == 1 else (color_mask,) * len(colors)
+            masks: Any = state.color_mask if len(colors) == 1 else (state.color_mask,) * len(colors)
             made.color_mask = masks
         made.depth_mask = depth_mask
-        made.scissor = scissor  # type: ignore[assignment]  # None takes the scissor away
+        made.scissor = state.scissor  # type: ignore[assignment]  # None takes the scissor away
         self._framebuffers[key] = made
         return made
 
@@ -294,31 +287,13 @@ class Memory(Struct, eq=False, dict=True):
         key = (number, depth)
         if key not in self._dummies:
             ctx = self.device.ctx
-            self._dummies[key] = ctx.depth_renderbuffer((1, 1)) if depth else ctx.renderbuffer((1, 1))
+            made = self._dummies[key] = ctx.depth_renderbuffer((1, 1)) if depth else ctx.renderbuffer((1, 1))
+            self._owned.callback(made.release)
         return self._dummies[key]
 
     def release(self) -> None:
         self.device.unbind()
-        for framebuffer in self._framebuffers.values():
-            framebuffer.release()
-        for renderbuffer in self._dummies.values():
-            renderbuffer.release()
-        for view in self._views.values():
-            textures.delete(self.device, view)
-        for sampler in self._samplers.values():
-            self.device.raw.delete("glDeleteSamplers", sampler)
-        for planned, physical in zip(self.plan.physicals, self.physicals, strict=False):  # __init__ may have failed
-            if self._is_scenes(planned):
-                continue
-            if isinstance(physical, GpuTexture) and not self._is_kept(planned):
-                self.pool.release(physical)
-            elif isinstance(physical, GpuTexture):
-                textures.delete(self.device, physical)
-            else:
-                physical.release()
-        for table in (self._framebuffers, self._dummies, self._views, self._samplers):
-            table.clear()
-        self.physicals.clear()
+        self._owned.close()
 
 
 def clear_target(

@@ -14,6 +14,7 @@ from msgspec.structs import replace
 from rendergraph import activity
 from rendergraph.allocate import ResourcePlan
 from rendergraph.catalog import NodeType
+from rendergraph.compile.bindings import Units, ViewBuffers
 from rendergraph.compile.checks import ProgramChecks, attribute_formats, check_attributes, layout_for
 from rendergraph.compile.executable import CompiledStep, Draw, Executable, SortedDraws, prefixed_reads, step_uniforms
 from rendergraph.compile.geometry import GeometryCompiler, MultiDraw, MultiDrawKey
@@ -21,10 +22,7 @@ from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES, SCENE_ATTRIBUTES,
 from rendergraph.compile.memory import Call, Memory, Region, TexturePool, clear_target
 from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.scene_buffers import TEXELS
-from rendergraph.compile.transfers import clear_buffer, image_calls, transfer_calls
-from rendergraph.compile.units import Units
-from rendergraph.compile.uploads import UploadedValues
-from rendergraph.compile.views import ViewBuffers
+from rendergraph.compile.transfers import UploadedValues, clear_buffer, image_calls, transfer_calls
 from rendergraph.errors import InputError, RenderError
 from rendergraph.expand import ViewTable
 from rendergraph.gl import state as gl_state
@@ -419,20 +417,13 @@ class _Compiler(Struct, eq=False, dict=True):
         depth: Write | Read | None = depth_write or next((r for r in step.reads if r.use == "depth_test"), None)
         attachments = [self.memory.attachment(write, parity) for write in colors]
         at_depth = self.memory.attachment(depth, parity) if depth is not None else None
-        state = step.state
-        depth_mask = depth_write is not None if state.depth_write is None else state.depth_write
+        state, within = step.state, None
+        if state.depth_write is None:
+            state = replace(state, depth_write=depth_write is not None)
+        if step.region is not None:
+            within = self.memory.regions.setdefault((step.node, step.region), Region())
         whole = self.memory.framebuffer(attachments, at_depth, step.size)
-        region = (step.node, step.region) if step.region is not None else None
-        within = self.memory.regions.setdefault(region, Region()) if region is not None else None
-        drawn = self.memory.framebuffer(
-            attachments,
-            at_depth,
-            step.size,
-            color_mask=state.color_mask,
-            depth_mask=depth_mask,
-            scissor=state.scissor,
-            region=region,
-        )
+        drawn = self.memory.framebuffer(attachments, at_depth, step.size, state, within)
         numbered: list[tuple[int | None, Write]] = [*enumerate(colors), *([(None, depth_write)] if depth_write else [])]
         clears = [self._clear(whole, number, write, parity) for number, write in numbered if write.load == "clear"]
         if clears:

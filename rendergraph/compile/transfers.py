@@ -1,19 +1,36 @@
-"""Operations without a program: clears, mip chains, copies; and image bindings of compute shaders."""
+"""Operations without a program: clears, mip chains, copies and uploads; and image bindings of compute shaders."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
+from typing import Any
 
+import numpy.typing as npt
+from msgspec import Struct
 from msgspec.structs import replace
 
+from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.compile.memory import Call, Memory
+from rendergraph.errors import Misuse, Place, shown_file
 from rendergraph.gl import textures
 from rendergraph.gl.device import Device
-from rendergraph.steps import Read, Step, Write
+from rendergraph.scene.facts import FrameScene
+from rendergraph.steps import Read, Step, Upload, Write
+from rendergraph.steps.checks import texels
 from rendergraph.textures import FORMATS, BufferDesc
 
 _COLOR, _NEAREST = 0x4000, 0x2600
 _R8UI, _RED_INTEGER, _UNSIGNED_BYTE, _READ_WRITE = 0x8232, 0x8D94, 0x1401, 0x88BA
+
+SCENE_CHANGES = {
+    "transforms": "instances",
+    "lights": "light_block",
+    "materials": "material_block",
+    "environment": "environment_block",
+    "camera": "camera",
+}
+"""The parts of a scene that can change, by the counters of `GpuScene.changes`."""
 
 
 def transfer_calls(device: Device, memory: Memory, step: Step, parity: int) -> list[Call]:
@@ -22,13 +39,14 @@ def transfer_calls(device: Device, memory: Memory, step: Step, parity: int) -> l
     if step.kind == "resolve":
         return _resolve(device, memory, step, parity)
     if step.kind == "mipmaps":
-        textures = [memory.texture(write.resource, parity) for write in step.writes]
-        return [partial(device.raw.glGenerateTextureMipmap, texture.glo) for texture in textures]
+        names = [memory.texture(write.resource, parity).glo for write in step.writes]
+        return [partial(device.raw.glGenerateTextureMipmap, name) for name in names]
     calls: list[Call] = []
     for write in step.writes:
-        calls += (
-            [clear_buffer(device, memory, write, parity)] if write.use == "buffer" else _clear(memory, write, parity)
-        )
+        if write.use == "buffer":
+            calls.append(clear_buffer(device, memory, write, parity))
+        else:
+            calls += _clear(memory, write, parity)
     return calls
 
 
@@ -47,18 +65,9 @@ def image_calls(device: Device, memory: Memory, step: Step, parity: int) -> tupl
         previous = isinstance(touched, Read) and touched.previous
         texture = memory.texture(touched.resource, parity, previous=previous)
         layered = touched.layer is None and texture.desc.kind != "texture2d"
-        calls.append(
-            partial(
-                device.raw.glBindImageTexture,
-                unit,
-                texture.glo,
-                touched.mip or 0,
-                int(layered),
-                touched.layer or 0,
-                _READ_WRITE,
-                FORMATS[texture.desc.format].gl,
-            )
-        )
+        part = touched.mip or 0, int(layered), touched.layer or 0
+        access = _READ_WRITE, FORMATS[texture.desc.format].gl
+        calls.append(partial(device.raw.glBindImageTexture, unit, texture.glo, *part, *access))
     for write in step.writes:
         if write.use == "image" and write.load == "clear":
             calls += _clear(memory, write, parity)
@@ -88,3 +97,51 @@ def _resolve(device: Device, memory: Memory, step: Step, parity: int) -> list[Ca
         calls.append(framebuffers[1].use)  # sets the target's scissor and masks
         calls.append(partial(device.raw.glBlitNamedFramebuffer, *names, *box, *box, _COLOR, _NEAREST))
     return calls
+
+
+class UploadedValues(Struct, eq=False):
+    """The values of one upload step; `step` returns it with the current parameters of its node."""
+
+    step: Callable[[], Step]
+    scene: GpuScene
+    memory: Memory
+    _array: npt.NDArray[Any] | None = None
+    _made_of: object = None
+
+    @property
+    def is_stale(self) -> bool:
+        """Whether the values must be computed, for the first time or again."""
+        return self._made_of != self._sources
+
+    @property
+    def _sources(self) -> object:
+        return self.upload, [self.scene.changes[SCENE_CHANGES[source]] for source in self.upload.sources]
+
+    @property
+    def upload(self) -> Upload:
+        found = dict(self.step().uniforms)["values"]
+        assert isinstance(found, Upload)
+        return found
+
+    def compute(self) -> None:
+        """Compute the values; exceptions of third-party functions propagate."""
+        values, (write,) = self.upload.values, self.step().writes
+        if callable(values):
+            desc = self.memory.plan.resources[write.resource].desc
+            code = getattr(getattr(values, "__func__", values), "__code__", None)
+            array = values(FrameScene(self.scene.scene, decode=self.scene.decode))
+            try:
+                values = texels(write.name, array, desc, write.mip, write.layer)
+            except Misuse as error:  # the function has returned, so its first line is the closest place
+                place = Place(shown_file(code.co_filename), code.co_firstlineno, 1) if code is not None else None
+                raise Misuse(str(error), error.code, place) from None
+        self._array, self._made_of = values, self._sources
+
+    def write(self, parity: int) -> None:
+        (write,) = self.step().writes
+        assert self._array is not None
+        if write.use == "buffer":
+            self.memory.buffer(write.resource, parity).write(self._array)
+        else:
+            texture = self.memory.texture(write.resource, parity)
+            textures.upload(self.memory.device, texture, self._array, mip=write.mip or 0, layer=write.layer)
