@@ -371,6 +371,7 @@ class Runner(Struct, eq=False):
         if executable.means is None:
             semantics = {str(end): info.semantic for end, info in self.graph.textures.items()}
             executable.means = LightMeans(executable, averaged_textures(executable.plan, semantics))
+            executable.owned.callback(executable.means.release)
         executable.means.moment, executable.means.count = moment, moments
         return executable.steps_with_stops(executable.means.calls(executable.parity))
 

@@ -7,6 +7,7 @@ writes only the others. A changed parameter only reassembles the lists: no GL ob
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from functools import cached_property
 from itertools import chain, pairwise
 from typing import TYPE_CHECKING, Any
@@ -29,8 +30,6 @@ from rendergraph.steps import Read, Step, UniformValue
 from rendergraph.steps.model import FunctionBinding
 
 if TYPE_CHECKING:
-    import moderngl
-
     from rendergraph.allocate import ResourcePlan
     from rendergraph.compile.bindings import ViewBuffers
     from rendergraph.compile.geometry import SceneView
@@ -154,9 +153,8 @@ class Executable(Struct, eq=False, dict=True):
         touched: the sources that have changed since the last frame, except the scene's.
         changes_seen: the scene's counters of changes at the last frame.
         recorded_steps: all recorded steps, including those that are not in the plan.
-        buffers: draw commands.
         uploads: values that the CPU computes for textures and buffers, by upload step.
-        vertex_arrays: frees the vertex arrays over the plan's own buffers.
+        owned: frees what it owns; programs and scenes belong to the session.
         drawn: frames since the history began; 0 if the history is lost.
         parity: which of the two textures of each history the last frame wrote.
         fresh: `statics` must be written and everything bound before the next frame.
@@ -178,9 +176,8 @@ class Executable(Struct, eq=False, dict=True):
     scene_views: list[SceneView] = field(default_factory=list)
     timers: list[Timer] = field(default_factory=list)
     occlusion_queries: list[OcclusionQuery] = field(default_factory=list)
-    buffers: list[moderngl.Buffer] = field(default_factory=list)
     uploads: Mapping[StepKey, UploadedValues] = field(default_factory=dict)
-    vertex_arrays: Call = bool
+    owned: ExitStack = field(default_factory=ExitStack)
     fresh: bool = True
     drawn: int = 0
     parity: int = 0
@@ -529,13 +526,7 @@ class Executable(Struct, eq=False, dict=True):
             due = due | more
 
     def release(self) -> None:
-        """Free what it owns; programs and scenes belong to the session."""
-        self.vertex_arrays()
-        for each in (self.memory, self.views, *self.buffers, *self.timers, *self.occlusion_queries, self.means):
-            if each is not None:
-                each.release()
-        self.timers.clear()
-        self.occlusion_queries.clear()
+        self.owned.close()
 
 
 def _with_functions(step: Step) -> list[tuple[str, Step | FunctionBinding]]:

@@ -11,6 +11,7 @@ list of draw commands is uploaded only if it has changed.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import ExitStack
 from functools import partial
 from itertools import groupby, pairwise
 from typing import Any
@@ -137,9 +138,9 @@ class GeometryCompiler(Struct, eq=False):
     """Multi-draws of a scene's objects, and the views that decide which objects they draw."""
 
     scene: GpuScene
+    owned: ExitStack
     views: dict[tuple[Any, ...], SceneView] = field(default_factory=dict)
     _multi_draws: dict[tuple[Any, ...], list[MultiDraw]] = field(default_factory=dict)
-    buffers: list[moderngl.Buffer] = field(default_factory=list)
 
     def draws(self, step: Step, make: Callable[[MultiDraw], Draw]) -> list[Draw] | SortedDraws:
         objects = select(self.scene.scene, step)
@@ -204,7 +205,7 @@ class GeometryCompiler(Struct, eq=False):
         """Return the commands of objects, updated whenever the step's view or an object has moved."""
         objects = np.array(list(members), np.int64)
         buffer = self.scene.device.ctx.buffer(reserve=len(objects) * COMMAND.itemsize)
-        self.buffers.append(buffer)
+        self.owned.callback(buffer.release)
         made = DrawList(buffer, self.scene.indices(step.topology), objects, step.order)
         key = self._view_key(step)
         self.views.setdefault(key, SceneView(*key)).lists.append(made)

@@ -16,6 +16,7 @@ from rendergraph.expand import SCENE_DATA
 from rendergraph.gl import textures
 from rendergraph.gl.textures import GpuTexture
 from rendergraph.schedule.dependencies import touched_ids
+from rendergraph.textures import BufferDesc
 
 if TYPE_CHECKING:
     import moderngl
@@ -58,17 +59,16 @@ class KeptValues(Struct, eq=False):
         """Copy cached values into an executable, which skips the steps that would compute them."""
         if not (executable.due and executable.shares_kept and self._copies):
             return
-        there = {id: content for id, content in contents(executable).items() if content in self._copies}
-        for id, content in there.items():
+        known = {id: content for id, content in contents(executable).items() if content in self._copies}
+        for id, content in known.items():
             held = self._copies[content] = self._copies.pop(content)
             self._copy(held, _of(executable, id))
-        if there:
-            executable.mark_restored(there)
+        if known:
+            executable.mark_restored(known)
 
     def release(self) -> None:
-        for held in self._copies.values():
-            self._delete(held)
-        self._copies.clear()
+        while self._copies:
+            self._delete(self._copies.popitem()[1])
 
     def _like(self, made: _Held) -> _Held:
         if isinstance(made, GpuTexture):
@@ -117,10 +117,9 @@ def contents(executable: Executable) -> Mapping[str, Content]:
             if more == ids:
                 break
             ids = more
-        if any(executable.uploads[key].upload.sources for key in makers if key in executable.uploads):
+        changes = any(executable.uploads[key].upload.sources for key in makers if key in executable.uploads)
+        if changes or SCENE_DATA.port in ids:
             continue  # computed from a scene that changes
-        if SCENE_DATA.port in ids:
-            continue  # likewise
         environment = any(resources[other].role == "scene" for other in ids)
         found[id] = (
             id,
@@ -132,9 +131,8 @@ def contents(executable: Executable) -> Mapping[str, Content]:
 
 
 def _of(executable: Executable, id: str) -> _Held:
-    place = executable.plan.placement[id][0]
-    made = executable.memory.physicals[place]
-    return executable.memory.texture(id) if isinstance(made, GpuTexture) else executable.memory.buffer(id)
+    is_buffer = isinstance(executable.plan.resources[id].desc, BufferDesc)
+    return executable.memory.buffer(id) if is_buffer else executable.memory.texture(id)
 
 
 def _bytes(held: _Held) -> int:

@@ -103,13 +103,13 @@ class Posing(Struct, eq=False):
 
     def advance(self) -> bool:
         """Save the positions as those of the previous frame; return whether previous positions are used and changed."""
-        stale, self.stale = (self.stale if self.before is not None else set()), set()
+        stale, self.stale = self.stale, set()
+        if self.before is None:
+            return False
         for number in stale:
-            assert self.before is not None
             first, count, *_ = self.uniforms[number]["mesh"]
-            self.device.ctx.copy_buffer(
-                self.before, self.streams["positions"], 12 * count, read_offset=12 * first, write_offset=12 * first
-            )
+            at = {"read_offset": 12 * first, "write_offset": 12 * first}
+            self.device.ctx.copy_buffer(self.before, self.streams["positions"], 12 * count, **at)
         return bool(stale)
 
     def _dispatch(self, meshes: Collection[int]) -> None:

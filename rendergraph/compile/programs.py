@@ -54,10 +54,8 @@ class ProgramCache(Struct, eq=False):
             from rendergraph.program.messages import compile_problems, link_problems  # only for errors of the driver
 
             stage, message = programs.driver_message(error)
-            found = (
-                compile_problems(message, texts[stage]) if stage and stage in texts else link_problems(message, texts)
-            )
-            raise InputError(found) from error
+            failed = texts.get(stage or "")
+            raise InputError(compile_problems(message, failed) if failed else link_problems(message, texts)) from error
         for name, binding in blocks.items():
             program.bind_block(name, binding)
         self._programs[key] = program
@@ -91,12 +89,9 @@ class ProgramCache(Struct, eq=False):
             _return_free_memory()
 
     def release(self) -> None:
-        for vertex_array in self._vertex_arrays.values():
-            vertex_array.release()
-        for program in self._programs.values():
-            program.release()
-        self._vertex_arrays.clear()
-        self._programs.clear()
+        for table in (self._vertex_arrays, self._programs):
+            while table:
+                table.popitem()[1].release()
 
 
 def _beyond_limit(texts: Iterable[str]) -> set[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import moderngl
+from moderngl import Buffer
 from msgspec import Struct
 
 from rendergraph.errors import Problem, RenderError
@@ -38,7 +38,7 @@ class SceneBuffers(Struct, eq=False):
     """
 
     device: Device
-    buffers: dict[str, moderngl.Buffer]
+    buffers: dict[str, Buffer]
     texels: dict[str, int]
     instances: Records
     arrays: TextureArrays
@@ -47,12 +47,7 @@ class SceneBuffers(Struct, eq=False):
 
     @classmethod
     def make(
-        cls,
-        device: Device,
-        scene: Scene,
-        packed: PackedScene,
-        indices: moderngl.Buffer,
-        images: Mapping[Stored, GpuTexture],
+        cls, device: Device, scene: Scene, packed: PackedScene, indices: Buffer, images: Mapping[Stored, GpuTexture]
     ) -> SceneBuffers:
         """Upload the missing buffers of a scene, and copy its uploaded images into arrays."""
         instances = scene_data.instance_data(scene, packed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
@@ -72,18 +73,15 @@ def compile_plan(
         poison: overwrite textures after their last use with a value that no picture should show.
     """
     check_plan(device.limits, plan, views)
-    memory = Memory(device, plan, scene.resource, pool)
-    buffers = ViewBuffers(device, views)
-    compiler = _Compiler(device, plan, types, views, scene, programs, memory, buffers, poison)
-    try:
-        return compiler.executable()
-    except BaseException:
-        programs.forget(id(memory))
-        for commands in compiler.geometry.buffers:
-            commands.release()
-        memory.release()
-        buffers.release()
-        raise
+    with ExitStack() as owned:
+        memory = Memory(device, plan, scene.resource, pool)
+        owned.callback(memory.release)
+        buffers = ViewBuffers(device, views)
+        owned.callback(buffers.release)
+        owned.callback(programs.forget, id(memory))
+        made = _Compiler(device, plan, types, views, scene, programs, memory, buffers, poison, owned).executable()
+        made.owned = owned.pop_all()
+        return made
 
 
 class CountedDraw(Struct, eq=False):
@@ -98,17 +96,14 @@ class CountedDraw(Struct, eq=False):
     step: Step
 
     def __call__(self) -> None:
-        raw, step = self.raw, self.step
+        raw, step, first = self.raw, self.step, _COMMAND_BYTES * self.step.command
         raw.glUseProgram(self.program)
         raw.glBindVertexArray(self.vertex_array)
         raw.glBindBuffer(_DRAW_INDIRECT_BUFFER, self.commands)
         raw.glBindBuffer(_PARAMETER_BUFFER, self.count)
         if step.indices:
-            raw.glMultiDrawElementsIndirectCountARB(
-                self.mode, _UNSIGNED_INT, _COMMAND_BYTES * step.command, 0, step.commands, _COMMAND_BYTES
-            )
+            raw.glMultiDrawElementsIndirectCountARB(self.mode, _UNSIGNED_INT, first, 0, step.commands, _COMMAND_BYTES)
         else:
-            first = _COMMAND_BYTES * step.command
             raw.glMultiDrawArraysIndirectCountARB(self.mode, first, 0, step.commands, _COMMAND_BYTES)
         raw.glBindBuffer(_PARAMETER_BUFFER, 0)
 
@@ -123,19 +118,19 @@ class _Compiler(Struct, eq=False, dict=True):
     memory: Memory
     views: ViewBuffers
     poison: bool
+    owned: ExitStack
 
     def __post_init__(self) -> None:
-        self._step_texts = StepTexts(self.types, self.plan.resources, self.view_tables)
+        self._texts = StepTexts(self.types, self.plan.resources, self.view_tables).of
         self.units = Units(self.device, self.memory.parities)
-        self.geometry = GeometryCompiler(self.scene)
+        self.geometry = GeometryCompiler(self.scene, self.owned)
         self._barrier = partial(self.device.raw.glMemoryBarrier, _ALL_BARRIERS)
         self._geometry_draws: dict[tuple[str, int, int], list[Draw] | SortedDraws] = {}
+        steps = self.plan.schedule.steps
+        self._names = step_names(steps)
         # A borrowed context may already have an active query, so there everything is drawn.
-        asked = {(step.node, step.if_drawn) for step in self.plan.schedule.steps} if self.device.owned else set()
-        self._names = step_names(self.plan.schedule.steps)
-        self._queries = {
-            step.key: OcclusionQuery(self.device) for step in self.plan.schedule.steps if step.key in asked
-        }
+        asked = {(step.node, step.if_drawn) for step in steps} if self.device.owned else set()
+        self._queries = {step.key: OcclusionQuery(self.device) for step in steps if step.key in asked}
         self.uses_previous = False
         self._uploads: dict[tuple[str, int], UploadedValues] = {}
         # When another texture takes over a memory block, the driver, unaware of sharing, must finish all earlier work.
@@ -152,12 +147,12 @@ class _Compiler(Struct, eq=False, dict=True):
         binds: list[list[Call]] = [[*calls, self.views.bind, self.scene.bind] for calls in self.units.binds()]
         made = Executable(self.device, self.plan, self.memory, self.views, self.scene, binds, steps)
         made.scene_views = list(self.geometry.views.values())
-        made.buffers = list(self.geometry.buffers)
         made.uploads = self._uploads
-        made.vertex_arrays = partial(self.programs.forget, id(self.memory))
         made.uses_previous = self.uses_previous or self.views.uses_previous
         made.timers = [Timer(self.device) for _ in self.plan.schedule.steps]
         made.occlusion_queries = list(self._queries.values())
+        for query in (*made.timers, *made.occlusion_queries):
+            self.owned.callback(query.release)
         made.invalidate()
         self.scene.drop_unused_images()
         activity.note("preparing a frame")()
@@ -166,23 +161,22 @@ class _Compiler(Struct, eq=False, dict=True):
     def _step(self, step: Step, position: int, parity: int) -> CompiledStep:
         compiled = CompiledStep(step, name=self._names[step.key])
         activity.note(f"compiling step '{compiled.name}'")()
-        drawing = {
-            "fullscreen": self._fullscreen,
-            "geometry": self._geometry,
-            "draw": self._draw,
-            "compute": self._compute,
-            "upload": self._upload,
-        }
-        drawing.get(step.kind, self._transfer)(step, compiled, parity)
-        if step.shaders:
-            calls, units = image_calls(self.device, self.memory, step, parity)
+        if step.kind == "upload":
+            values = self._uploads.setdefault(step.key, UploadedValues(lambda: compiled.step, self.scene, self.memory))
+            compiled.before.append(partial(values.write, parity))
+        elif not step.shaders:
+            compiled.before += transfer_calls(self.memory, step, parity)
+        else:
+            drawing = {"fullscreen": self._fullscreen, "geometry": self._geometry, "draw": self._draw}
+            drawing.get(step.kind, self._compute)(step, compiled, parity)
+            calls, units = image_calls(self.memory, step, parity)
             compiled.before[:0] = calls  # first, because clears may bind another framebuffer
             for draw in compiled.all_draws:
                 draw.uniforms |= {name: unit for name, unit in units.items() if name in draw.program.uniforms}
         stored = [] if step.kind in ("clear", "upload") else [w for w in step.writes if w.use in ("buffer", "image")]
         for write in stored:
             if write.use == "buffer" and write.load == "clear":
-                compiled.before.append(clear_buffer(self.device, self.memory, write, parity))
+                compiled.before.append(clear_buffer(self.memory, write, parity))
         self._watch(step, compiled)
         if stored and step.kind != "copy":  # OpenGL does not synchronise image and buffer stores
             compiled.before.insert(0, self._barrier)
@@ -248,7 +242,7 @@ class _Compiler(Struct, eq=False, dict=True):
             if wanted:
                 content.append((buffer, formats, *wanted))
             names.append(buffer.glo)
-        check_attributes(step, program, held, self._texts(step, {}))
+        check_attributes(step, program, held, partial(self._texts, step, {}))
         index = self.memory.buffer(step.indices, parity) if step.indices else None
         key = (id(self.memory), "draw", index and index.glo, *names, *(layout for layout, _ in step.attributes))
         vertex_array = self.programs.vertex_array(program, key, content, index)
@@ -261,7 +255,7 @@ class _Compiler(Struct, eq=False, dict=True):
                 call = CountedDraw(self.device.raw, program.glo, vertex_array.glo, source.glo, count.glo, mode, step)
         elif isinstance(step.instances, str):
             command = self.device.ctx.buffer(np.array([step.vertices, 1, 0, 0, 0], np.uint32).tobytes())
-            self.geometry.buffers.append(command)
+            self.owned.callback(command.release)
             number = self.memory.buffer(step.instances, parity)
             compiled.before.append(partial(self.device.ctx.copy_buffer, command, number, 4, write_offset=4))
             call = partial(vertex_array.render_indirect, command, mode, 1)
@@ -276,7 +270,7 @@ class _Compiler(Struct, eq=False, dict=True):
         def make(multi_draw: MultiDraw) -> Draw:
             macros = defines | dict(multi_draw.key.defines)
             program, binds, uniforms = self._program(step, parity, macros, materials=multi_draw.textures)
-            check_attributes(step, program, SCENE_ATTRIBUTES, self._texts(step, macros))
+            check_attributes(step, program, SCENE_ATTRIBUTES, partial(self._texts, step, macros))
             for slot, (texture, sampler) in multi_draw.textures.items():
                 uniforms[slot] = self.units.unit((texture,), sampler, binds)
             vertex_array = self.scene.vertex_array(self.programs, program, step.topology)
@@ -302,19 +296,11 @@ class _Compiler(Struct, eq=False, dict=True):
     def _compute(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         program, binds, uniforms = self._program(step, parity, {})
         if isinstance(step.groups, str):
-            call: Call = partial(
-                program.object.run_indirect, self.memory.buffer(step.groups, parity), 12 * step.command
-            )
+            groups = self.memory.buffer(step.groups, parity)
+            call: Call = partial(program.object.run_indirect, groups, 12 * step.command)
         else:
             call = partial(program.object.run, *groups_of(step, program.local_size, self.device.limits))
         compiled.draws.append(Draw(program, uniforms, None, call, binds))
-
-    def _upload(self, step: Step, compiled: CompiledStep, parity: int) -> None:
-        values = self._uploads.setdefault(step.key, UploadedValues(lambda: compiled.step, self.scene, self.memory))
-        compiled.before.append(partial(values.write, parity))
-
-    def _transfer(self, step: Step, compiled: CompiledStep, parity: int) -> None:
-        compiled.before += transfer_calls(self.device, self.memory, step, parity)
 
     def _program(
         self, step: Step, parity: int, defines: Mapping[str, str], *, materials: Collection[str] = ()
@@ -328,7 +314,7 @@ class _Compiler(Struct, eq=False, dict=True):
             before_views["previous_pass_view_block"] = step.view
         reads = prefixed_reads(step)
         storage = self.views.first_storage_binding
-        buffers: list[Call] = []
+        binds: list[Call] = []
         touched: list[tuple[str, Read | Write]] = [*reads, *(("", write) for write in step.writes)]
         for before, use in touched:
             view = self.plan.resources[use.resource].view
@@ -336,7 +322,7 @@ class _Compiler(Struct, eq=False, dict=True):
                 blocks[before + use.name] = storage
                 previous = isinstance(use, Read) and use.previous
                 buffer = self.memory.buffer(use.resource, parity, previous=previous)
-                buffers.append(partial(buffer.bind_to_storage_buffer, storage))
+                binds.append(partial(buffer.bind_to_storage_buffer, storage))
                 storage += 1
             elif view is not None and isinstance(use, Read):
                 if use.previous:  # last frame's texture was drawn with last frame's view
@@ -348,7 +334,7 @@ class _Compiler(Struct, eq=False, dict=True):
         macros = {**self.scene.light_defines, **self._sample_positions(step), **defines}
         if step.reads_scene:
             macros |= self.scene.data_defines
-        texts = self._texts(step, macros)
+        texts: Texts = partial(self._texts, step, macros)
         if step.reads_scene:
             used = {name for text in texts().values() for _, name, _ in declared_blocks(text.text)}
             held = dict(self.scene.data.buffers)
@@ -359,7 +345,7 @@ class _Compiler(Struct, eq=False, dict=True):
             self._check_stages(step, texts())
             for block in sorted(used & held.keys()):
                 blocks[block] = storage
-                buffers.append(partial(held[block].bind_to_storage_buffer, storage))
+                binds.append(partial(held[block].bind_to_storage_buffer, storage))
                 storage += 1
         try:
             program = self.programs.get(texts(), blocks, outputs)
@@ -368,7 +354,6 @@ class _Compiler(Struct, eq=False, dict=True):
             raise InputError(missing(step, texts(), self.types[step.node].cls) or error.problems) from error
         for name in before_views.keys() & program.block_names:
             self.views.keep_previous(before_views[name])
-        binds: list[Call] = buffers
         uniforms = step_uniforms(step)
         sampled: set[str] = set()
         for before, read in reads:
@@ -396,9 +381,13 @@ class _Compiler(Struct, eq=False, dict=True):
         for stage, text in texts.items():
             count = sum(storage == "buffer" for storage, _, _ in declared_blocks(compiled_text(text.text)))
             if count > self.device.limits[f"{stage}_storage"]:
-                what = f"its {stage} shader has {count} storage blocks with those of the scene, "
-                what += f"this device supports {self.device.limits[f'{stage}_storage']} there"
-                raise RenderError(step.problem("RG435", f"{what}; fragment and compute shaders have at least 8"))
+                message = (
+                    f"its {stage} shader has {count} storage blocks with those of the scene, this device supports "
+                )
+                message += (
+                    f"{self.device.limits[f'{stage}_storage']} there; fragment and compute shaders have at least 8"
+                )
+                raise RenderError(step.problem("RG435", message))
 
     def _sample_positions(self, step: Step) -> dict[str, str]:
         """Return macros with the device's sample positions in the step's targets and inputs."""
@@ -406,9 +395,6 @@ class _Compiler(Struct, eq=False, dict=True):
         counts = {step.samples, *(desc.samples for desc in descs if isinstance(desc, TextureDesc))} - {1}
         texts = {count: [f"vec2({x}, {y})" for x, y in self.device.sample_positions(count)] for count in sorted(counts)}
         return {positions_macro(count): f"vec2[]({', '.join(text)})" for count, text in texts.items()}
-
-    def _texts(self, step: Step, macros: Mapping[str, str]) -> Texts:
-        return partial(self._step_texts.of, step, macros)
 
     def _target(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         """Bind the framebuffer, after the step's clears."""

@@ -14,7 +14,6 @@ from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.compile.memory import Call, Memory
 from rendergraph.errors import Misuse, Place, shown_file
 from rendergraph.gl import textures
-from rendergraph.gl.device import Device
 from rendergraph.scene.facts import FrameScene
 from rendergraph.steps import Read, Step, Upload, Write
 from rendergraph.steps.checks import texels
@@ -33,41 +32,39 @@ SCENE_CHANGES = {
 """The parts of a scene that can change, by the counters of `GpuScene.changes`."""
 
 
-def transfer_calls(device: Device, memory: Memory, step: Step, parity: int) -> list[Call]:
+def transfer_calls(memory: Memory, step: Step, parity: int) -> list[Call]:
     if step.kind == "copy":
-        return _copy(device, memory, step, parity)
+        return _copy(memory, step, parity)
     if step.kind == "resolve":
-        return _resolve(device, memory, step, parity)
+        return _resolve(memory, step, parity)
     if step.kind == "mipmaps":
         names = [memory.texture(write.resource, parity).glo for write in step.writes]
-        return [partial(device.raw.glGenerateTextureMipmap, name) for name in names]
+        return [partial(memory.device.raw.glGenerateTextureMipmap, name) for name in names]
     calls: list[Call] = []
     for write in step.writes:
         if write.use == "buffer":
-            calls.append(clear_buffer(device, memory, write, parity))
+            calls.append(clear_buffer(memory, write, parity))
         else:
             calls += _clear(memory, write, parity)
     return calls
 
 
-def clear_buffer(device: Device, memory: Memory, write: Write, parity: int) -> Call:
+def clear_buffer(memory: Memory, write: Write, parity: int) -> Call:
     """Return a call that clears a buffer on the device: moderngl's clear maps the buffer, and so waits for readers."""
     glo = memory.buffer(write.resource, parity).glo
-    return partial(device.raw.glClearNamedBufferData, glo, _R8UI, _RED_INTEGER, _UNSIGNED_BYTE, None)
+    return partial(memory.device.raw.glClearNamedBufferData, glo, _R8UI, _RED_INTEGER, _UNSIGNED_BYTE, None)
 
 
-def image_calls(device: Device, memory: Memory, step: Step, parity: int) -> tuple[list[Call], dict[str, int]]:
+def image_calls(memory: Memory, step: Step, parity: int) -> tuple[list[Call], dict[str, int]]:
     """Return the calls that bind and clear the images of a compute step, and the image unit of each name."""
     images: list[Read | Write] = [read for read in step.reads if read.use == "image"]
     images += [write for write in step.writes if write.use == "image"]
     calls: list[Call] = []
     for unit, touched in enumerate(images):
-        previous = isinstance(touched, Read) and touched.previous
-        texture = memory.texture(touched.resource, parity, previous=previous)
-        layered = touched.layer is None and texture.desc.kind != "texture2d"
-        part = touched.mip or 0, int(layered), touched.layer or 0
-        access = _READ_WRITE, FORMATS[texture.desc.format].gl
-        calls.append(partial(device.raw.glBindImageTexture, unit, texture.glo, *part, *access))
+        image = memory.attachment(touched, parity)
+        texture, layered = image.texture, image.layer is None and image.texture.desc.kind != "texture2d"
+        given = image.mip, int(layered), image.layer or 0, _READ_WRITE, FORMATS[texture.desc.format].gl
+        calls.append(partial(memory.device.raw.glBindImageTexture, unit, texture.glo, *given))
     for write in step.writes:
         if write.use == "image" and write.load == "clear":
             calls += _clear(memory, write, parity)
@@ -78,15 +75,16 @@ def _clear(memory: Memory, write: Write, parity: int) -> list[Call]:
     return memory.clear(write.resource, parity, write.clear, mip=write.mip, layer=write.layer)
 
 
-def _copy(device: Device, memory: Memory, step: Step, parity: int) -> list[Call]:
+def _copy(memory: Memory, step: Step, parity: int) -> list[Call]:
     (read,), (write,) = step.reads, step.writes
     if isinstance(memory.plan.resources[read.resource].desc, BufferDesc):
         source, target = memory.buffer(read.resource, parity), memory.buffer(write.resource, parity)
-        return [partial(device.ctx.copy_buffer, target, source)]
-    return list(textures.copies(device, memory.texture(read.resource, parity), memory.texture(write.resource, parity)))
+        return [partial(memory.device.ctx.copy_buffer, target, source)]
+    texture, copy = memory.texture(read.resource, parity), memory.texture(write.resource, parity)
+    return textures.copies(memory.device, texture, copy)
 
 
-def _resolve(device: Device, memory: Memory, step: Step, parity: int) -> list[Call]:
+def _resolve(memory: Memory, step: Step, parity: int) -> list[Call]:
     (read,), (write,) = step.reads, step.writes
     source, target = memory.attachment(read, parity), memory.attachment(write, parity)
     calls: list[Call] = []
@@ -95,7 +93,7 @@ def _resolve(device: Device, memory: Memory, step: Step, parity: int) -> list[Ca
         names = [framebuffer.glo for framebuffer in framebuffers]
         box = (0, 0, *step.size)
         calls.append(framebuffers[1].use)  # sets the target's scissor and masks
-        calls.append(partial(device.raw.glBlitNamedFramebuffer, *names, *box, *box, _COLOR, _NEAREST))
+        calls.append(partial(memory.device.raw.glBlitNamedFramebuffer, *names, *box, *box, _COLOR, _NEAREST))
     return calls
 
 
