@@ -32,7 +32,7 @@ from rendergraph.errors import (
 from rendergraph.expand import CAMERA
 from rendergraph.gl import textures
 from rendergraph.gl.queries import Timer
-from rendergraph.gl.saved_state import settle
+from rendergraph.gl.state import settle
 from rendergraph.link import Graph, GraphNode
 from rendergraph.ports import Count
 from rendergraph.projection import shifted

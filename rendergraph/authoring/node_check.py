@@ -21,7 +21,7 @@ from rendergraph.errors import InputError, Place, Problem, RendergraphError, sho
 from rendergraph.expand import Expansion
 from rendergraph.gl.device import Device, open_device
 from rendergraph.gl.programs import outputs_of
-from rendergraph.gl.saved_state import SavedState
+from rendergraph.gl.state import SavedState
 from rendergraph.program import prefix
 from rendergraph.program.text import VERSION
 from rendergraph.scene.cameras import view_matrices

@@ -32,7 +32,6 @@ from rendergraph.steps.model import FunctionBinding
 if TYPE_CHECKING:
     from rendergraph.allocate import ResourcePlan
     from rendergraph.compile.bindings import ViewBuffers
-    from rendergraph.compile.geometry import SceneView
     from rendergraph.compile.gpu_scene import GpuScene
     from rendergraph.compile.memory import Memory
     from rendergraph.compile.transfers import UploadedValues
@@ -147,7 +146,7 @@ class Executable(Struct, eq=False, dict=True):
         binds: the calls that bind textures, samplers and blocks, one list per parity.
         lists: the steps of the next frame, one list per parity; filled by `assemble`.
         due: kept steps that the next frame runs.
-        scene_views: the drawn objects and their order; updated when a view or an object has moved.
+        cull_and_sort: `GeometryCompiler.cull_and_sort` with the views.
         contents: bytes that `update` has written into buffers.
         stale: the buffers among them that this drawing has not written yet.
         touched: the sources that have changed since the last frame, except the scene's.
@@ -173,7 +172,7 @@ class Executable(Struct, eq=False, dict=True):
     lists: list[list[FrameStep]] = field(default_factory=list)
     due: set[StepKey] = field(default_factory=set)
     statics: list[Call] = field(default_factory=list)
-    scene_views: list[SceneView] = field(default_factory=list)
+    cull_and_sort: Callable[..., object] = bool
     timers: list[Timer] = field(default_factory=list)
     occlusion_queries: list[OcclusionQuery] = field(default_factory=list)
     uploads: Mapping[StepKey, UploadedValues] = field(default_factory=dict)
@@ -223,12 +222,6 @@ class Executable(Struct, eq=False, dict=True):
         self.due = set(self.kept)
         self.reuse.forget()
         self.assemble()
-
-    def cull_and_sort(self, *, moved: bool, cull: bool) -> None:
-        """Cull and sort the objects of geometry steps; `moved` tells whether objects have moved."""
-        for each in self.scene_views:
-            if moved or each.table in self.views.changed:
-                each.cull_and_sort(self.scene.packed, self.views, cull=cull)
 
     def end_frame(self) -> None:
         """Mark the kept steps that were due as done."""

@@ -142,6 +142,12 @@ class GeometryCompiler(Struct, eq=False):
     views: dict[tuple[Any, ...], SceneView] = field(default_factory=dict)
     _multi_draws: dict[tuple[Any, ...], list[MultiDraw]] = field(default_factory=dict)
 
+    def cull_and_sort(self, views: ViewBuffers, *, moved: bool, cull: bool) -> None:
+        """Update the lists of views that have changed, or of all if objects have moved."""
+        for view in self.views.values():
+            if moved or view.table in views.changed:
+                view.cull_and_sort(self.scene.packed, views, cull=cull)
+
     def draws(self, step: Step, make: Callable[[MultiDraw], Draw]) -> list[Draw] | SortedDraws:
         objects = select(self.scene.scene, step)
         if not objects:

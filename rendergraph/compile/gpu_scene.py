@@ -319,7 +319,7 @@ class GpuScene(Struct, eq=False, dict=True):
         if key not in self._samplers:
             is_trilinear = texture.min_filter == "linear_mipmap_linear"
             steps = min(_ANISOTROPY, self.device.limits["anisotropy"]) if is_trilinear else 1
-            made = self._samplers[key] = textures.create_gl_sampler(self.device, *key, anisotropy=steps)
+            made = self._samplers[key] = textures.create_gl_sampler(self.device, *key, steps)
             self._owned.callback(self.device.raw.delete, "glDeleteSamplers", made)
         return image, self._samplers[key]
 

@@ -18,7 +18,7 @@ from rendergraph.gl import textures
 from rendergraph.gl.device import Device
 from rendergraph.gl.memory_objects import MemoryBlock, make_blocks
 from rendergraph.gl.raw import RawGL
-from rendergraph.gl.textures import GpuTexture, texel
+from rendergraph.gl.textures import ClearValue, GpuTexture, texel
 from rendergraph.steps import Read, State, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
 
@@ -257,13 +257,7 @@ class Memory(Struct, eq=False, dict=True):
         return Attachment(self.texture(write.resource, parity, previous=previous), write.mip or 0, write.layer)
 
     def clear(
-        self,
-        resource: str,
-        parity: int,
-        value: float | tuple[float, ...],
-        *,
-        mip: int | None = None,
-        layer: int | None = None,
+        self, resource: str, parity: int, value: ClearValue, *, mip: int | None = None, layer: int | None = None
     ) -> list[Call]:
         """Return calls that clear a texture, mip or layer; views are cleared by a framebuffer (`textures.Clear`)."""
         texture = self.texture(resource, parity)
@@ -297,7 +291,7 @@ class Memory(Struct, eq=False, dict=True):
 
 
 def clear_target(
-    device: Device, framebuffer: moderngl.Framebuffer, index: int | None, format: str, value: float | tuple[float, ...]
+    device: Device, framebuffer: moderngl.Framebuffer, index: int | None, format: str, value: ClearValue
 ) -> Call:
     """Return the call that clears one attachment of a bound framebuffer, by its number or None for depth."""
     family = FORMATS[format].family

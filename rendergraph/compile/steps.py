@@ -146,7 +146,7 @@ class _Compiler(Struct, eq=False, dict=True):
         self._keep_units(steps)
         binds: list[list[Call]] = [[*calls, self.views.bind, self.scene.bind] for calls in self.units.binds()]
         made = Executable(self.device, self.plan, self.memory, self.views, self.scene, binds, steps)
-        made.scene_views = list(self.geometry.views.values())
+        made.cull_and_sort = partial(self.geometry.cull_and_sort, self.views)
         made.uploads = self._uploads
         made.uses_previous = self.uses_previous or self.views.uses_previous
         made.timers = [Timer(self.device) for _ in self.plan.schedule.steps]
@@ -380,14 +380,10 @@ class _Compiler(Struct, eq=False, dict=True):
         """Refuse more storage blocks than a stage of this device supports; vertex shaders may support none."""
         for stage, text in texts.items():
             count = sum(storage == "buffer" for storage, _, _ in declared_blocks(compiled_text(text.text)))
-            if count > self.device.limits[f"{stage}_storage"]:
-                message = (
-                    f"its {stage} shader has {count} storage blocks with those of the scene, this device supports "
-                )
-                message += (
-                    f"{self.device.limits[f'{stage}_storage']} there; fragment and compute shaders have at least 8"
-                )
-                raise RenderError(step.problem("RG435", message))
+            if count > (most := self.device.limits[f"{stage}_storage"]):
+                what = f"its {stage} shader has {count} storage blocks with those of the scene"
+                what += f", this device supports {most} there; fragment and compute shaders have at least 8"
+                raise RenderError(step.problem("RG435", what))
 
     def _sample_positions(self, step: Step) -> dict[str, str]:
         """Return macros with the device's sample positions in the step's targets and inputs."""

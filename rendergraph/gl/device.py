@@ -1,4 +1,4 @@
-"""The GL device: opening a context, its identity and its limits."""
+"""The GL device: opening a context, its identity, its limits and its free memory."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from typing import Any
 import moderngl
 from msgspec import Struct, field
 
-from rendergraph.errors import DeviceError, Problem
+from rendergraph import system
+from rendergraph.errors import DeviceError, Problem, RenderError, UsageError
 from rendergraph.gl.raw import RawGL
-from rendergraph.gl.saved_state import SavedState, settle
 from rendergraph.system import EGL, GL
 
 REQUIRED_VERSION = 450
 TIME_ELAPSED = 0x88BF
+MEMORY_LIMIT = "RENDERGRAPH_MEMORY_LIMIT"
 SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swiftshader")
 
 
@@ -73,6 +74,8 @@ class Device(Struct, eq=False, dict=True):
             with previous_context(), self.ctx:
                 yield
             return
+        from rendergraph.gl.state import SavedState, settle  # only for borrowed contexts
+
         saved = SavedState(self.raw, self.ctx)
         try:
             settle(self.raw)
@@ -168,11 +171,12 @@ def open_device(index: int | None = None) -> Device:
             "start new processes instead, as multiprocessing does with 'spawn'"
         )
         raise DeviceError(Problem("RG611", text))
-    named = os.environ.get("RENDERGRAPH_DEVICE", "0")
-    if index is None and not named.isdecimal():
-        text = f"RENDERGRAPH_DEVICE is '{named}', not the number of a device as `rendergraph doctor` lists them"
-        raise DeviceError(Problem("RG611", text))
-    chosen = index if index is not None else int(named)
+    if index is None:
+        named = os.environ.get("RENDERGRAPH_DEVICE", "0")
+        if not named.isdecimal():
+            text = f"RENDERGRAPH_DEVICE is '{named}', not the number of a device as `rendergraph doctor` lists them"
+            raise DeviceError(Problem("RG611", text))
+        index = int(named)
     try:
         with previous_context():
             from glcontext import egl  # type: ignore[import-untyped]  # ships no types
@@ -182,7 +186,7 @@ def open_device(index: int | None = None) -> Device:
                 "libgl": os.environ.get("GLCONTEXT_LINUX_LIBGL") or "libGL.so.1",
                 "libegl": os.environ.get("GLCONTEXT_LINUX_LIBEGL") or EGL,
             }
-            context = egl.create_context(mode="standalone", glversion=REQUIRED_VERSION, device_index=chosen, **names)
+            context = egl.create_context(mode="standalone", glversion=REQUIRED_VERSION, device_index=index, **names)
             ctx = moderngl.create_context(context=context)
             return _wrap(ctx, context.load, owned=True)
     except DeviceError:
@@ -268,3 +272,42 @@ def _wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
     limits["counted_draws"] = int("GL_ARB_indirect_parameters" in ctx.extensions)
     raw.error()  # from limits that this driver does not know
     return Device(ctx, raw, owned, limits)
+
+
+def check_memory(device: Device, needed: int, allowed: int | None = None) -> None:
+    """Refuse a plan before allocating it: some drivers end the process where others return an error.
+
+    Args:
+        needed: bytes.
+        allowed: MiB; by default RENDERGRAPH_MEMORY_LIMIT, else three quarters of the device's free memory.
+    """
+    named = os.environ.get(MEMORY_LIMIT, "")
+    if allowed is None and named:
+        if not named.isdecimal():
+            raise UsageError(Problem("RG500", f"{MEMORY_LIMIT} is '{named}', not a number of MiB, as in 4096"))
+        allowed = int(named)
+    if allowed is not None:
+        limit, of = allowed << 20, ""
+    elif (free := free_on_device(device) or system.free_memory()) is not None:
+        limit, of = free * 3 // 4, f", three quarters of the {free / 2**20:.0f} MiB that are free"
+    else:
+        return
+    if needed > limit:
+        text = (
+            f"the plan needs {needed / 2**20:.0f} MiB of textures, {limit / 2**20:.0f} MiB may be used{of}; "
+            f"a smaller --size helps, --limit plan-memory=MiB allows more, as does {MEMORY_LIMIT}"
+        )
+        raise RenderError(Problem("RG616", text))
+
+
+def free_on_device(device: Device) -> int | None:
+    """Return the bytes that the driver reports as free for textures, None if it does not or the device is the CPU."""
+    if device.software:
+        return None
+    for extension, parameter in (("GL_NVX_gpu_memory_info", 0x9049), ("GL_ATI_meminfo", 0x87FC)):
+        if extension in device.ctx.extensions:
+            kibibytes = (ctypes.c_int * 4)()  # the second query returns four numbers, the total first
+            device.raw.glGetIntegerv(parameter, ctypes.byref(kibibytes))
+            if kibibytes[0] > 0:
+                return kibibytes[0] * 1024
+    return None

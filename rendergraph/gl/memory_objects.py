@@ -122,7 +122,7 @@ class Vulkan:
         size = (desc.width, desc.height, depth, desc.mips, layers)
         asked = (14, _address(external), flags, kind, _FORMATS[desc.format], *size, desc.samples, 0, uses, 0, 0, 0, 0)
         image, found = ctypes.c_uint64(), (ctypes.c_uint64 * 3)()
-        self._call("vkCreateImage", self._device, _packed("@I P 13I P I", *asked), None, ctypes.byref(image))
+        _call(self._library, "vkCreateImage", self._device, _packed("@I P 13I P I", *asked), None, ctypes.byref(image))
         self._library.vkGetImageMemoryRequirements(self._device, image, found)
         self._library.vkDestroyImage(self._device, image, None)
         return found[0], found[2] & 0xFFFFFFFF
@@ -136,18 +136,16 @@ class Vulkan:
         exported = _packed("@I P I", 1000072002, 0, _OPAQUE_FD)
         memory, descriptor = ctypes.c_uint64(), ctypes.c_int(-1)
         asked = _packed("@I P Q I", 5, _address(exported), size, chosen)
-        self._call("vkAllocateMemory", self._device, asked, None, ctypes.byref(memory))
+        _call(self._library, "vkAllocateMemory", self._device, asked, None, ctypes.byref(memory))
         self._library.vkGetDeviceProcAddr.restype = ctypes.c_void_p
         address = self._library.vkGetDeviceProcAddr(self._device, b"vkGetMemoryFdKHR")
         get = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(address)
         asked = _packed("@I P Q I", 1000074002, 0, memory.value, _OPAQUE_FD)
         result = get(self._device, _address(asked), ctypes.addressof(descriptor))
         self._library.vkFreeMemory(self._device, memory, None)  # the descriptor keeps the memory
-        _check("vkGetMemoryFdKHR", result)
+        if result:
+            raise NoMemoryObjects(f"vkGetMemoryFdKHR failed ({result})")
         return descriptor.value
-
-    def _call(self, name: str, *arguments: Any) -> None:
-        _check(name, getattr(self._library, name)(*arguments))
 
 
 @contextmanager
@@ -161,14 +159,14 @@ def open_vulkan(identity: bytes) -> Iterator[Vulkan]:
     application = _packed("@I P P I P I I", 0, 0, 0, 0, 0, 0, 1 << 22 | 1 << 12)
     with _no_layer():
         asked = _packed("@I P I P I P I P", 1, 0, 0, _address(application), 0, 0, 0, 0)
-        _check("vkCreateInstance", library.vkCreateInstance(asked, None, ctypes.byref(instance)))
+        _call(library, "vkCreateInstance", asked, None, ctypes.byref(instance))
     try:
         physical = _same_device(library, instance, identity)
         priority = ctypes.c_float(1.0)
         queue = _packed("@I P I I I P", 2, 0, 0, 0, 1, ctypes.addressof(priority))
         names = (ctypes.c_char_p * 1)(b"VK_KHR_external_memory_fd")
         asked = _packed("@I P I I P I P I P P", 3, 0, 0, 1, _address(queue), 0, 0, 1, _address(names), 0)
-        _check("vkCreateDevice", library.vkCreateDevice(physical, asked, None, ctypes.byref(device)))
+        _call(library, "vkCreateDevice", physical, asked, None, ctypes.byref(device))
         try:
             yield Vulkan(library, physical, device)
         finally:
@@ -213,6 +211,6 @@ def _address(structure: Any) -> int:
     return ctypes.addressof(structure)
 
 
-def _check(name: str, result: int) -> None:
-    if result:
+def _call(library: Any, name: str, *arguments: Any) -> None:
+    if result := getattr(library, name)(*arguments):
         raise NoMemoryObjects(f"{name} failed ({result})")

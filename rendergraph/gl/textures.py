@@ -10,7 +10,7 @@ import ctypes
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,8 @@ from msgspec.structs import replace
 from rendergraph.errors import Problem, RenderError
 from rendergraph.gl.device import Device
 from rendergraph.textures import FORMATS, Sampler, TextureDesc
+
+ClearValue: TypeAlias = float | tuple[float, ...]
 
 MOST_READ = 1 << 30  # bytes read back at once
 
@@ -77,15 +79,9 @@ def view(
 ) -> GpuTexture:
     """Return a view of a texture in another format of its texel class, or of one mip or layer as a 2D texture."""
     desc = texture.desc
-    viewed = TextureDesc(
-        kind=desc.kind if layer is None else "texture2d",
-        format=format or desc.format,
-        width=desc.mip_size(mip or 0)[0],
-        height=desc.mip_size(mip or 0)[1],
-        layers=desc.mip_layers(mip or 0) if layer is None else 1,
-        mips=desc.mips if mip is None else 1,
-        samples=desc.samples,
-    )
+    kind, layers = (desc.kind, desc.mip_layers(mip or 0)) if layer is None else ("texture2d", 1)
+    mips = desc.mips if mip is None else 1
+    viewed = TextureDesc(kind, format or desc.format, *desc.mip_size(mip or 0), layers, mips, desc.samples)
     raw = device.raw
     glo = raw.make("glGenTextures")
     target = target_of(viewed)
@@ -122,13 +118,11 @@ def transfer_format(format_name: str) -> tuple[int, int, Any, int]:
         return _DEPTH_COMPONENT, _FLOAT, np.float32, 1
     if fmt.family == "depth_stencil":
         return _DEPTH_STENCIL, _FLOAT_32_UNSIGNED_INT_24_8_REV, np.float32, 2
-    if fmt.family == "uint":
-        return _INTEGER_CHANNELS[fmt.components], _UINT, np.uint32, fmt.components
-    if fmt.family == "int":
-        return _INTEGER_CHANNELS[fmt.components], _INT, np.int32, fmt.components
-    if fmt.is_bytes:
-        return _CHANNELS[fmt.components], _UBYTE, np.uint8, fmt.components
-    return _CHANNELS[fmt.components], _FLOAT, np.float32, fmt.components
+    if fmt.family in ("uint", "int"):
+        integer = (_UINT, np.uint32) if fmt.family == "uint" else (_INT, np.int32)
+        return _INTEGER_CHANNELS[fmt.components], *integer, fmt.components
+    number = (_UBYTE, np.uint8) if fmt.is_bytes else (_FLOAT, np.float32)
+    return _CHANNELS[fmt.components], *number, fmt.components
 
 
 def read(
@@ -252,13 +246,10 @@ def fill_mips(device: Device, texture: GpuTexture) -> None:
     raw.glBindImageTexture(0, 0, 0, 0, 0, _WRITE_ONLY, image_format)
 
 
-def texel(value: float | tuple[float, ...], channels: int, dtype: Any) -> npt.NDArray[Any]:
+def texel(value: ClearValue, channels: int, dtype: Any) -> npt.NDArray[Any]:
     """Return a clear value for the channels of a format: one number fills them all, missing ones are 0."""
-    values = np.zeros(channels, np.float64)
     given = np.atleast_1d(np.asarray(value, np.float64))[:channels]
-    values[: len(given)] = given
-    if len(given) == 1:
-        values[:] = given[0]
+    values = np.pad(given, (0, channels - len(given))) if len(given) > 1 else np.repeat(given, channels)
     if np.issubdtype(dtype, np.integer):
         limits = np.iinfo(dtype)
         values = np.clip(np.nan_to_num(values), limits.min, limits.max)
@@ -275,7 +266,7 @@ class Clear:
         self,
         device: Device,
         texture: GpuTexture,
-        value: float | tuple[float, ...],
+        value: ClearValue,
         *,
         mip: int | None = None,
         layer: int | None = None,
@@ -330,37 +321,25 @@ def create_texel_buffer(device: Device, buffer: int, format: str) -> int:
 
 def create_sampler(device: Device, sampler: Sampler) -> int:
     """Create a sampler; its border is by default 1 in every channel (lit), and 0 for comparisons."""
-    is_trilinear = sampler.filter == "trilinear"
-    filters = ("linear_mipmap_linear", "linear") if is_trilinear else (sampler.filter, sampler.filter)
-    wraps = sampler.wrap, sampler.wrap
+    filters = ("linear_mipmap_linear", "linear") if sampler.filter == "trilinear" else (sampler.filter, sampler.filter)
+    glo = create_gl_sampler(device, *filters, sampler.wrap, sampler.wrap, sampler.anisotropy)
     border = float(not sampler.compare) if sampler.border is None else sampler.border
-    return create_gl_sampler(
-        device, *filters, *wraps, compare=sampler.compare, anisotropy=sampler.anisotropy, border=border
-    )
+    device.raw.glSamplerParameterfv(glo, 0x1004, (ctypes.c_float * 4)(*texel(border, 4, np.float32)))
+    if sampler.compare:
+        device.raw.glSamplerParameteri(glo, 0x884C, 0x884E)  # COMPARE_MODE, COMPARE_REF_TO_TEXTURE
+        device.raw.glSamplerParameteri(glo, 0x884D, 0x0206)  # COMPARE_FUNC, GEQUAL: 1 if not farther than the texel
+    return glo
 
 
 def create_gl_sampler(
-    device: Device,
-    min_filter: str,
-    mag_filter: str,
-    wrap_s: str,
-    wrap_t: str,
-    *,
-    compare: bool = False,
-    anisotropy: int = 1,
-    border: float | tuple[float, ...] = 1.0,
+    device: Device, min_filter: str, mag_filter: str, wrap_s: str, wrap_t: str, anisotropy: int = 1
 ) -> int:
     raw = device.raw
     glo = raw.make("glCreateSamplers")
-    raw.glSamplerParameteri(glo, 0x2801, _FILTERS[min_filter])
-    raw.glSamplerParameteri(glo, 0x2800, _FILTERS[mag_filter])
-    raw.glSamplerParameteri(glo, 0x2802, _WRAPS[wrap_s])
-    raw.glSamplerParameteri(glo, 0x2803, _WRAPS[wrap_t])
-    raw.glSamplerParameteri(glo, 0x8072, _WRAPS[wrap_t])  # along the depth of 3D textures
-    raw.glSamplerParameterfv(glo, 0x1004, (ctypes.c_float * 4)(*texel(border, 4, np.float32)))
-    if compare:
-        raw.glSamplerParameteri(glo, 0x884C, 0x884E)  # COMPARE_MODE, COMPARE_REF_TO_TEXTURE
-        raw.glSamplerParameteri(glo, 0x884D, 0x0206)  # COMPARE_FUNC, GEQUAL: 1 if not farther than the texel
+    for parameter, kind in ((0x2801, min_filter), (0x2800, mag_filter)):
+        raw.glSamplerParameteri(glo, parameter, _FILTERS[kind])
+    for parameter, wrap in ((0x2802, wrap_s), (0x2803, wrap_t), (0x8072, wrap_t)):  # the last: depth of 3D textures
+        raw.glSamplerParameteri(glo, parameter, _WRAPS[wrap])
     if anisotropy > 1:
         raw.glSamplerParameteri(glo, 0x84FE, anisotropy)
     return glo

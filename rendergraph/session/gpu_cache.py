@@ -14,8 +14,7 @@ from rendergraph.compile.generated import TextureGenerator
 from rendergraph.declare import Node
 from rendergraph.errors import Problem
 from rendergraph.expand import Expansion
-from rendergraph.gl.device import Device
-from rendergraph.gl.memory import check_memory
+from rendergraph.gl.device import Device, check_memory
 from rendergraph.images import decode, decode_light
 from rendergraph.scene import pack
 from rendergraph.scene.model import ImageSource, Scene

@@ -13,7 +13,7 @@ import rendergraph as rg
 from rendergraph.allocate import Physical
 from rendergraph.compile.memory import Memory, TexturePool
 from rendergraph.gl import textures
-from rendergraph.gl.saved_state import settle
+from rendergraph.gl.state import settle
 from rendergraph.steps import Resource
 from rendergraph.textures import FORMATS, TextureDesc
 

@@ -12,7 +12,7 @@ import pytest
 import rendergraph as rg
 from rendergraph import system
 from rendergraph.errors import RenderError, UsageError
-from rendergraph.gl.memory import check_memory, free_on_device
+from rendergraph.gl.device import check_memory, free_on_device
 
 MIB = 1 << 20
 
