@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from time import perf_counter
 from typing import Annotated, Any, Optional, TypeAlias
 
@@ -115,12 +116,9 @@ class FrameContext(Struct, eq=False):
         depth_bounds: tuple[float, float] | None = None,
     ) -> None:
         """Restrict the steps of a `region` to a part of the picture from now on."""
-        for name, value, annotation in (
-            ("number", number, Count),
-            ("scissor", scissor, Optional[_Scissor]),  # noqa: UP045  # pyright knows no `|` of Annotated
-            ("depth_bounds", depth_bounds, Optional[DepthBounds]),  # noqa: UP045  # nor of this
-        ):
-            check_argument(name, value, annotation)
+        check_argument("number", number, Count)
+        check_argument("scissor", scissor, Optional[_Scissor])  # noqa: UP045  # pyright knows no `|` of Annotated
+        check_argument("depth_bounds", depth_bounds, Optional[DepthBounds])  # noqa: UP045  # nor of this
         region = self.executable.memory.regions.get((self.node.id, number))
         if region is not None:  # otherwise its steps do not run
             region.set(scissor, depth_bounds)
@@ -128,9 +126,8 @@ class FrameContext(Struct, eq=False):
     def set_uniform(self, name: str, value: UniformValue) -> None:
         known = self.executable.uniforms.get(self.node.id, ())
         if name not in known:
-            hint = suggestion(name, known) if known else ""
-            text = f"set_uniform is given {quoted(name)}, which is not a parameter or a keyword of a step{hint}"
-            raise Misuse(text, "RG433")
+            text = f"set_uniform is given {quoted(name)}, which is not a parameter or a keyword of a step"
+            raise Misuse(text + (suggestion(name, known) if known else ""), "RG433")
         mismatch = self.executable.set_uniform(self.node.id, name, uniform_of(name, value))
         if mismatch is not None:
             raise Misuse(f"set_uniform: {mismatch}", "RG433")
@@ -150,14 +147,14 @@ class FrameContext(Struct, eq=False):
         name = f"{self.node.id}.{port.name}"
         if name not in self.executable.plan.placement:
             return  # the buffer is unused in this pipeline
-        role = self.executable.plan.resources[name].role
-        if role == "kept":
+        resource = self.executable.plan.resources[name]
+        if resource.role == "kept":
             raise Misuse(f"it writes '{port.name}', which is kept, in each frame; remove `kept=True`", "RG433")
-        if role == "history":
+        if resource.role == "history":
             text = f"it writes '{port.name}', which holds last frame's values; write an Internal and copy it in a step"
             raise Misuse(text, "RG433")
         array = np.ascontiguousarray(values)
-        element = self.executable.plan.resources[name].desc.element  # type: ignore[union-attr]  # it is a buffer
+        element = resource.desc.element  # type: ignore[union-attr]  # it is a buffer
         if array.dtype.kind not in "biuf" and (element is None or array.dtype != element.dtype):
             raise Misuse(f"write is given {type(values).__name__} of {array.dtype}, not an array of numbers", "RG433")
         data, size = array.tobytes(), self.executable.memory.buffer(name).size
@@ -193,22 +190,19 @@ class Runner(Struct, eq=False):
     _time: float = 0.0
 
     def __post_init__(self) -> None:
-        active = {step.node for step in self.executable.plan.schedule.steps}
-        active |= {f.node for step in self.executable.plan.schedule.steps for f in step.functions}
-        active |= {str(step.view).rpartition(".")[0] for step in self.executable.plan.schedule.steps}  # compute views
-        for node in reversed(nodes := _views_first(self.graph)):
-            if node.id in active:  # it may request the views of its inputs
-                active |= set(_view_makers(self.graph, node))
-        self._active = active
+        plan, nodes = self.executable.plan, _views_first(self.graph)
+        for step in plan.schedule.steps:
+            computes_view = str(step.view).rpartition(".")[0]
+            self._active |= {step.node, computes_view, *(function.node for function in step.functions)}
+        for node in reversed(nodes):
+            if node.id in self._active:  # it may request the views of its inputs
+                self._active |= set(_view_makers(self.graph, node))
+        nodes = [node for node in nodes if node.id in self._active]
         self._computed = {node.id: found for node in nodes if (found := self._computed_views(node))}
-        self._updating = [
-            node
-            for node in nodes
-            if node.id in active and (type(node.node).update is not Node.update or node.id in self._computed)
-        ]
-        jittering = (n for n in nodes if type(n.node).camera_jitter is not Node.camera_jitter)
-        self._jittering = next((node for node in jittering if node.id in active), None)
-        plan = self.executable.plan
+        updates = {node.id for node in nodes if type(node.node).update is not Node.update}
+        self._updating = [node for node in nodes if node.id in updates or node.id in self._computed]
+        jittering = (node for node in nodes if type(node.node).camera_jitter is not Node.camera_jitter)
+        self._jittering = next(jittering, None)
         self._histories = {id: len(at) for id, at in plan.placement.items() if plan.resources[id].role == "history"}
         self.reset()
 
@@ -218,10 +212,10 @@ class Runner(Struct, eq=False):
 
     def _computed_views(self, node: GraphNode) -> list[tuple[Views, Callable[[Any], Sequence[ViewMatrices]]]]:
         """Return the view tables of a node that have a `compute` function, and these functions."""
-        tables, ports = self.executable.views.tables, node.node.ports().values()
+        tables = self.executable.views.tables
         return [
             (port, port.compute)
-            for port in ports
+            for port in node.node.ports().values()
             if isinstance(port, Views) and port.compute is not None
             if (table := tables.get(f"{node.id}.{port.name}")) is not None and table.count
         ]
@@ -249,13 +243,12 @@ class Runner(Struct, eq=False):
         if self._repeats:
             return
         memory = self.executable.memory
-        for name, count in self._histories.items():
+        for name, parity in ((name, parity) for name, count in self._histories.items() for parity in range(count)):
             resource = self.executable.plan.resources[name]
-            for parity in range(count):
-                if isinstance(resource.desc, BufferDesc):
-                    memory.buffer(name, parity).clear()
-                else:
-                    textures.Clear(self.executable.device, memory.texture(name, parity), resource.first)()
+            if isinstance(resource.desc, BufferDesc):
+                memory.buffer(name, parity).clear()
+            else:
+                textures.Clear(self.executable.device, memory.texture(name, parity), resource.first)()
 
     def run(
         self,
@@ -289,10 +282,9 @@ class Runner(Struct, eq=False):
             self._scene, moved = FrameScene(scene, self._scene, self.executable.scene.decode), True
         self._scene.scene = scene
         updates: dict[str, float] = {}
-        has_moved = partial(_has_moved, moved_from, self._seen)
+        has_moved, first = partial(_has_moved, moved_from, self._seen), self.drawn == 0
         for node in self._updating:
             before = perf_counter()
-            first = self.drawn == 0
             frame = FrameContext(executable, self.graph, node, index, time, camera, self._scene, has_moved, first)
             with _author_errors(node, "update"):
                 node.node.update(frame)  # pyright: ignore[reportArgumentType]  # a cached_property is one to mypy
@@ -348,8 +340,7 @@ class Runner(Struct, eq=False):
                     call()
                 if measured:
                     step.timer.stop()
-                node_id = step.step.node
-                taken.append((step.step, perf_counter() - before + updates.pop(node_id, 0.0), step.timer))
+                taken.append((step.step, perf_counter() - before + updates.pop(step.step.node, 0.0), step.timer))
         except BaseException:
             executable.abort()
             raise
@@ -371,7 +362,6 @@ class Runner(Struct, eq=False):
         if executable.means is None:
             semantics = {str(end): info.semantic for end, info in self.graph.textures.items()}
             executable.means = LightMeans(executable, averaged_textures(executable.plan, semantics))
-            executable.owned.callback(executable.means.release)
         executable.means.moment, executable.means.count = moment, moments
         return executable.steps_with_stops(executable.means.calls(executable.parity))
 
@@ -423,8 +413,7 @@ class Runner(Struct, eq=False):
 
     def check(self) -> None:
         """Raise a RenderError for driver errors since the last check."""
-        error = self.executable.device.raw.error()
-        if error:
+        if error := self.executable.device.raw.error():
             self.executable.invalidate()
             raise RenderError(Problem("RG614", f"the driver reported {error} while drawing"))
 
@@ -433,13 +422,12 @@ class Runner(Struct, eq=False):
 
         The top row comes first; samples are resolved. `layer` selects one layer, `stencil` replaces depth.
         """
-        executable = self.executable
-        desc = executable.plan.resources[resource].desc
+        device, memory, parity = self.executable.device, self.executable.memory, self.executable.parity
+        desc = self.executable.plan.resources[resource].desc
         if isinstance(desc, BufferDesc):
-            executable.device.ctx.finish()
-            return np.frombuffer(executable.memory.buffer(resource, self.executable.parity).read(desc.bytes), np.uint8)
-        texture = executable.memory.texture(resource, self.executable.parity)
-        texels = textures.read(executable.device, texture, mip=mip, layer=layer, stencil=stencil)
+            device.ctx.finish()
+            return np.frombuffer(memory.buffer(resource, parity).read(desc.bytes), np.uint8)
+        texels = textures.read(device, memory.texture(resource, parity), mip=mip, layer=layer, stencil=stencil)
         return texels[0] if desc.kind == "texture2d" or layer is not None else texels
 
 
@@ -452,9 +440,10 @@ def _has_moved(before: tuple[Scene, ViewMatrices] | None, now: tuple[Scene, View
 
 def _view_makers(graph: Graph, node: GraphNode) -> Iterator[str]:
     """Yield the nodes with whose views the inputs of a node were drawn."""
-    for ends in node.inputs.values():
-        views = (graph.textures[end.now].view for end in ends if not end.previous)
-        yield from (maker for maker in (view.rpartition(".")[0] for view in views if view) if maker in graph)
+    for end in chain.from_iterable(node.inputs.values()):
+        maker = "" if end.previous else (graph.textures[end.now].view or "").rpartition(".")[0]
+        if maker in graph:
+            yield maker
 
 
 def _views_first(graph: Graph) -> list[GraphNode]:
@@ -462,12 +451,11 @@ def _views_first(graph: Graph) -> list[GraphNode]:
     found: dict[str, GraphNode] = {}
 
     def visit(node: GraphNode) -> None:
-        if node.id in found:
-            return
-        found[node.id] = node
-        for maker in _view_makers(graph, node):
-            visit(graph[maker])
-        found[node.id] = found.pop(node.id)
+        if node.id not in found:
+            found[node.id] = node
+            for maker in _view_makers(graph, node):
+                visit(graph[maker])
+            found[node.id] = found.pop(node.id)
 
     for node in graph.nodes:
         visit(node)
@@ -495,22 +483,17 @@ def _author_errors(node: GraphNode, method: str) -> Iterator[None]:
 
 def median_times(frames: Sequence[FrameTimes]) -> list[StepTime]:
     """Return per node, in order of execution, the median over frames of its steps' summed times; 0 if none ran."""
-    sums: dict[str, list[tuple[float, float | None]]] = {}
-    for frame in frames:
-        totals: dict[str, tuple[float, float | None]] = {}
+    runs: dict[str, list[list[StepTime]]] = {}
+    for number, frame in enumerate(frames):
         for step in frame.steps:
-            cpu, gpu = totals.get(step.node, (0.0, None))
-            if step.gpu_ms is not None:
-                gpu = (gpu or 0.0) + step.gpu_ms
-            totals[step.node] = (cpu + step.cpu_ms, gpu)
-        for node, total in totals.items():
-            sums.setdefault(node, []).append(total)
+            runs.setdefault(step.node, [[] for _ in frames])[number].append(step)
     result = []
-    for node, totals_of in sums.items():
-        measured = any(gpu is not None for _, gpu in totals_of)
-        totals_of += [(0.0, 0.0 if measured else None)] * (len(frames) - len(totals_of))
-        gpus = [gpu for _, gpu in totals_of if gpu is not None]
-        result.append(StepTime(node, _median([cpu for cpu, _ in totals_of]), _median(gpus) if gpus else None))
+    for node, by_frame in runs.items():
+        measured = [[step.gpu_ms for step in steps if step.gpu_ms is not None] for steps in by_frame]
+        # A frame without an answer of the driver does not count, unlike one in which no step ran.
+        gpu = [sum(times) for times, steps in zip(measured, by_frame, strict=True) if times or not steps]
+        cpu = [sum(step.cpu_ms for step in steps) for steps in by_frame]
+        result.append(StepTime(node, _median(cpu), _median(gpu) if any(measured) else None))
     return result
 
 

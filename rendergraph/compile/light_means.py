@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from rendergraph.compile.memory import Attachment, Call
 from rendergraph.gl import state as gl_state
 from rendergraph.gl import textures
+from rendergraph.gl.textures import GpuTexture
 from rendergraph.program.text import VERSION
 from rendergraph.resources import folder
 from rendergraph.steps import ADD, State
@@ -73,7 +74,7 @@ class LightMeans(Struct, eq=False):
     stops: Mapping[int, Mapping[str, bool]]
     moment: int = 0
     count: int = 1
-    _sums: dict[str, textures.GpuTexture] = field(default_factory=dict)
+    _sums: dict[str, GpuTexture] = field(default_factory=dict)
     _programs: dict[tuple[int, str], tuple[Any, Any]] = field(default_factory=dict)
 
     def calls(self, parity: int) -> dict[int, Call]:
@@ -87,16 +88,15 @@ class LightMeans(Struct, eq=False):
             source = executable.memory.texture(name, parity)
             if name not in self._sums:
                 desc = replace(source.desc, format="rgba32f", mips=1)
-                self._sums[name] = textures.create(executable.device, desc, f"the mean of {name}")
+                total = self._sums[name] = textures.create(executable.device, desc, f"the mean of {name}")
+                executable.owned.callback(textures.delete, executable.device, total)
             self._draw(source, self._sums[name], "DECODE" if encoded else "", 1.0, adds=self.moment > 0)
             if self.moment == self.count - 1:
                 self._draw(self._sums[name], source, "ENCODE" if encoded else "", float(self.count), adds=False)
         for call in executable.binds[parity]:
             call()
 
-    def _draw(
-        self, source: textures.GpuTexture, target: textures.GpuTexture, define: str, divisor: float, *, adds: bool
-    ) -> None:
+    def _draw(self, source: GpuTexture, target: GpuTexture, define: str, divisor: float, *, adds: bool) -> None:
         device, samples = self.executable.device, source.desc.samples
         if (samples, define) not in self._programs:
             program = device.ctx.program(
@@ -104,25 +104,19 @@ class LightMeans(Struct, eq=False):
                 fragment_shader=f"{VERSION}\n#define SAMPLES {samples}\n{f'#define {define} 1' if define else ''}\n"
                 f"{_shader('srgb.glsl')}{_shader('light_mean.frag')}",
             )
-            self._programs[samples, define] = program, device.ctx.vertex_array(program, [])
+            vertex_array = device.ctx.vertex_array(program, [])
+            self._programs[samples, define] = program, vertex_array
+            for made in (program, vertex_array):
+                self.executable.owned.callback(made.release)
         program, vertex_array = self._programs[samples, define]
         state = State(blend=ADD if adds else None)
-        calls: list[Callable[[], object]] = [
-            self.executable.memory.framebuffer([Attachment(target, 0, None)], None, target.desc.size).use,
-            *gl_state.changes(None, gl_state.pieces(device.raw, state, depth_test=False, cull="none")),
-            partial(device.raw.glBindTextureUnit, 0, source.glo),
-            partial(device.raw.glBindSampler, 0, 0),
-        ]
-        for call in calls:
+        self.executable.memory.framebuffer([Attachment(target)], None, target.desc.size).use()
+        for call in gl_state.changes(None, gl_state.pieces(device.raw, state, depth_test=False, cull="none")):
             call()
+        device.raw.glBindTextureUnit(0, source.glo)
+        device.raw.glBindSampler(0, 0)
         program["divisor"] = divisor
         vertex_array.render(moderngl.TRIANGLES, 3)
-
-    def release(self) -> None:
-        for texture in self._sums.values():
-            textures.delete(self.executable.device, texture)
-        for each in (one for pair in self._programs.values() for one in pair):
-            each.release()
 
 
 def _shader(name: str) -> str:

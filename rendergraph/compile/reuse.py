@@ -20,7 +20,7 @@ from typing import TypeAlias
 from msgspec import Struct, field
 
 from rendergraph.allocate import ResourcePlan
-from rendergraph.schedule.dependencies import Versions, continues, is_filled_by_update
+from rendergraph.schedule.dependencies import Versions, continues, is_filled_by_update, touched_ids
 from rendergraph.steps import Step
 
 Value: TypeAlias = tuple[str, int]
@@ -30,7 +30,8 @@ Source: TypeAlias = "str | tuple[object, ...]"
 """A block of the scene or of the frame, or `("view", table)`, `("step", key)` for parameters, `("buffer", id)`, …"""
 
 _Slot: TypeAlias = int | str  # a physical texture by index; a history, which alternates between two, by its id
-_State: TypeAlias = frozenset[tuple[_Slot, Value]]
+_Held: TypeAlias = tuple[_Slot, Value]
+_State: TypeAlias = frozenset[_Held]
 
 _MOST_KNOWN = 512
 """Maximum number of cached choices."""
@@ -39,8 +40,8 @@ _MOST_KNOWN = 512
 class _StepState(Struct, frozen=True):
     """The values that a step needs and leaves, with their memory slots."""
 
-    needs: tuple[tuple[_Slot, Value], ...]
-    leaves: tuple[tuple[_Slot, Value], ...]
+    needs: tuple[_Held, ...]
+    leaves: tuple[_Held, ...]
 
 
 class Reuse(Struct, eq=False, dict=True):
@@ -81,11 +82,8 @@ class Reuse(Struct, eq=False, dict=True):
 
     def _chosen(self, state: _State, changed: frozenset[Source], repeats: bool) -> tuple[tuple[int, ...], _State]:
         stale = self._stale(changed, self._refilled if repeats else self._refilled | self._looking_back)
-        held: dict[_Slot, Value] = {
-            slot: value
-            for slot, value in state
-            if (repeats or isinstance(slot, int)) and self._makers[value] not in stale
-        }  # histories have swapped their textures unless the frame repeats the previous one
+        lasting = (pair for pair in state if repeats or isinstance(pair[0], int))  # otherwise histories have swapped
+        held = {slot: value for slot, value in lasting if self._makers[value] not in stale}
         run = self._back_from_goals(held)
         while True:
             missing, after = self._missing(run, held)
@@ -104,9 +102,7 @@ class Reuse(Struct, eq=False, dict=True):
                 wanted += [value for slot, value in self._step_states[position].needs if held.get(slot) != value]
         return run
 
-    def _missing(
-        self, run: set[int], held: Mapping[_Slot, Value]
-    ) -> tuple[list[tuple[_Slot, Value]], dict[_Slot, Value]]:
+    def _missing(self, run: set[int], held: Mapping[_Slot, Value]) -> tuple[list[_Held], dict[_Slot, Value]]:
         """Return the values that one of the steps in `run` would miss, and the memory's state at that point."""
         now = dict(held)
         for position in sorted(run):
@@ -143,7 +139,7 @@ class Reuse(Struct, eq=False, dict=True):
         return [self._of(step) for step in self.plan.schedule.steps]
 
     @cached_property
-    def _goals(self) -> list[tuple[_Slot, Value]]:
+    def _goals(self) -> list[_Held]:
         """The values required at the end of a frame: outputs, and history for the next frame."""
         shown = set(self.plan.schedule.outputs.values())
         shown |= {id for id in self._versions.writers if self.plan.resources[id].role == "history"}
@@ -158,33 +154,24 @@ class Reuse(Struct, eq=False, dict=True):
     @cached_property
     def _refilled(self) -> set[int]:
         """Steps that use buffers which the CPU fills before steps write them."""
-        filled = {
-            id
-            for id in self._versions.writers
-            if is_filled_by_update(id, self.plan.resources[id], self._versions) and self._moves(id)
-        }
-        return {
-            at
-            for at, step in enumerate(self.plan.schedule.steps)
-            if any(read.resource in filled for read in step.all_reads)
-            or any(write.resource in filled for write in step.writes)
-        }
+        resources, versions = self.plan.resources, self._versions
+        moving = filter(self._moves, versions.writers)
+        filled = {id for id in moving if is_filled_by_update(id, resources[id], versions)}
+        steps = enumerate(self.plan.schedule.steps)
+        return {at for at, step in steps if not filled.isdisjoint(touched_ids(step))}
 
     def _of(self, step: Step) -> _StepState:
-        needs: dict[tuple[_Slot, Value], None] = {}
-        for read in step.all_reads:
-            version = self._before(read.resource, read.version + 1)
-            if version is not None and not read.previous and self._moves(read.resource):
-                needs[self._at(read.resource, version)] = None
-        for write in step.writes:
-            if not self._moves(write.resource):
-                continue
-            version = self._before(write.resource, write.version)
-            if version is not None and continues(step, write, self.plan.resources[write.resource]):
-                needs[self._at(write.resource, version)] = None
-        leaves = [self._at(write.resource, write.version) for write in step.writes if self._moves(write.resource)]
+        writes = [write for write in step.writes if self._moves(write.resource)]
+        needs = {(read.resource, read.version + 1) for read in step.all_reads if not read.previous}
+        needs |= {(w.resource, w.version) for w in writes if continues(step, w, self.plan.resources[w.resource])}
+        held = {
+            self._at(id, version)
+            for id, below in needs
+            if self._moves(id) and (version := self._before(id, below)) is not None
+        }
+        leaves = [self._at(write.resource, write.version) for write in writes]
         # Layers that a step writes are successive versions, so values that it writes itself are not needed before it.
-        return _StepState(tuple(needs.keys() - set(leaves)), tuple(leaves))
+        return _StepState(tuple(held.difference(leaves)), tuple(leaves))
 
     def _moves(self, id: str) -> bool:
         """Return whether a resource is computed in each frame, unlike kept ones and those of the scene."""
@@ -199,6 +186,6 @@ class Reuse(Struct, eq=False, dict=True):
         found = bisect_right(made, version - 1)
         return made[found - 1] if found else None
 
-    def _at(self, id: str, version: int) -> tuple[_Slot, Value]:
+    def _at(self, id: str, version: int) -> _Held:
         history = self.plan.resources[id].role == "history"
         return (id if history else self.plan.placement[id][0]), (id, version)
