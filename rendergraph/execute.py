@@ -109,12 +109,7 @@ class FrameContext(Struct, eq=False):
                 raise Misuse(f"set_views is given {type(view).__name__}, not ViewMatrices", "RG433")
         self.executable.views.set(f"{self.node.id}.{port.name}", views)
 
-    def set_region(
-        self,
-        number: int,
-        scissor: tuple[int, int, int, int] | None = None,
-        depth_bounds: tuple[float, float] | None = None,
-    ) -> None:
+    def set_region(self, number: int, scissor: _Scissor | None = None, depth_bounds: DepthBounds | None = None) -> None:
         """Restrict the steps of a `region` to a part of the picture from now on."""
         check_argument("number", number, Count)
         check_argument("scissor", scissor, Optional[_Scissor])  # noqa: UP045  # pyright knows no `|` of Annotated

@@ -11,12 +11,12 @@ import math
 from itertools import combinations
 
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import ArrayLike, NDArray
 
 from rendergraph.steps import ViewMatrices
 
-Matrix = npt.NDArray[np.float64]
-Points = npt.NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Points = NDArray[np.float64]
 
 INFINITE_EPSILON = 2.4e-7
 """Margin of an infinite far plane inside the clip volume: two steps of a float32 at 1."""
@@ -34,15 +34,13 @@ def frustum(left: float, right: float, bottom: float, top: float, near: float, f
         z, w = INFINITE_EPSILON - 1, near * (INFINITE_EPSILON - 2)
     else:
         z, w = (far + near) / (near - far), 2 * far * near / (near - far)
-    return np.array(
-        [
-            [2 * near / (right - left), 0, (right + left) / (right - left), 0],
-            [0, 2 * near / (top - bottom), (top + bottom) / (top - bottom), 0],
-            [0, 0, z, w],
-            [0, 0, -1, 0],
-        ],
-        np.float64,
-    )
+    rows = [
+        [2 * near / (right - left), 0, (right + left) / (right - left), 0],
+        [0, 2 * near / (top - bottom), (top + bottom) / (top - bottom), 0],
+        [0, 0, z, w],
+        [0, 0, -1, 0],
+    ]
+    return np.array(rows, np.float64)
 
 
 def perspective(fov_y: float, aspect: float, near: float, far: float) -> Matrix:
@@ -55,15 +53,13 @@ def perspective(fov_y: float, aspect: float, near: float, far: float) -> Matrix:
 
 def orthographic(left: float, right: float, bottom: float, top: float, near: float, far: float) -> Matrix:
     """Return an orthographic projection; `near` may be 0 or behind the view."""
-    return np.array(
-        [
-            [2 / (right - left), 0, 0, -(right + left) / (right - left)],
-            [0, 2 / (top - bottom), 0, -(top + bottom) / (top - bottom)],
-            [0, 0, -2 / (far - near), -(far + near) / (far - near)],
-            [0, 0, 0, 1],
-        ],
-        np.float64,
-    )
+    rows = [
+        [2 / (right - left), 0, 0, -(right + left) / (right - left)],
+        [0, 2 / (top - bottom), 0, -(top + bottom) / (top - bottom)],
+        [0, 0, -2 / (far - near), -(far + near) / (far - near)],
+        [0, 0, 0, 1],
+    ]
+    return np.array(rows, np.float64)
 
 
 def widened(projection: Matrix, factor: float) -> Matrix:
@@ -89,7 +85,7 @@ def guard_band(resolution: int, texels: float) -> float:
 # --- views: world space to view space --------------------------------------------------------------------------------
 
 
-def unit(vectors: npt.ArrayLike) -> Points:
+def unit(vectors: ArrayLike) -> Points:
     """Normalise vectors along the last axis; zero vectors stay zero."""
     given = np.asarray(vectors, np.float64)
     rows = given.reshape(math.prod(given.shape[:-1]), given.shape[-1])
@@ -100,7 +96,7 @@ def unit(vectors: npt.ArrayLike) -> Points:
     return np.ascontiguousarray((scaled / np.where(length > 0, length, 1.0)).T).reshape(given.shape)
 
 
-def look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0, 1.0, 0.0)) -> Matrix:
+def look_at(eye: ArrayLike, target: ArrayLike, up: ArrayLike = (0.0, 1.0, 0.0)) -> Matrix:
     """Return a camera's transform (view to world) at `eye`, looking at `target`; `inverse_rigid` gives the view matrix.
 
     If `up` is parallel to the view direction, another axis replaces it, so a camera may look straight down.
@@ -136,9 +132,7 @@ def inverse_rigid(transform: Matrix) -> Matrix:
     return matrix
 
 
-def view_along(
-    direction: npt.ArrayLike, side: npt.ArrayLike | None = None, eye: npt.ArrayLike = (0.0, 0.0, 0.0)
-) -> Matrix:
+def view_along(direction: ArrayLike, side: ArrayLike | None = None, eye: ArrayLike = (0.0, 0.0, 0.0)) -> Matrix:
     """Return world to view: from `eye` along a direction, with `side` towards +x; by default any side."""
     forward = np.asarray(direction, np.float64)
     forward = forward / np.linalg.norm(forward)
@@ -151,7 +145,7 @@ def view_along(
     return view
 
 
-def any_side(direction: npt.ArrayLike) -> Matrix:
+def any_side(direction: ArrayLike) -> Matrix:
     """Return the world axis that is most perpendicular to a direction, shape (3,)."""
     side = np.zeros(3)
     side[int(np.argmin(np.abs(np.asarray(direction, np.float64))))] = 1.0
@@ -162,7 +156,7 @@ def any_side(direction: npt.ArrayLike) -> Matrix:
 
 
 def orthographic_view(
-    rotation: Matrix, low: npt.ArrayLike, high: npt.ArrayLike, resolution: int, margin: float = 0.0
+    rotation: Matrix, low: ArrayLike, high: ArrayLike, resolution: int, margin: float = 0.0
 ) -> ViewMatrices:
     """Return an orthographic view around a box given in the axes of a rotation.
 
@@ -187,13 +181,7 @@ def orthographic_view(
 
 
 def cone_view(
-    eye: npt.ArrayLike,
-    direction: npt.ArrayLike,
-    half_angle: float,
-    near: float,
-    far: float,
-    resolution: int,
-    margin: float = 0.0,
+    eye: ArrayLike, direction: ArrayLike, half_angle: float, near: float, far: float, resolution: int, margin: float = 0
 ) -> ViewMatrices:
     """Return a square perspective view around a cone, with `margin` texels around it."""
     wider = math.atan(math.tan(half_angle) * guard_band(resolution, margin))
@@ -202,7 +190,7 @@ def cone_view(
 
 
 def narrowed_view(
-    view: ViewMatrices, low: npt.ArrayLike, high: npt.ArrayLike, near: float, far: float, margin: float = 0.0
+    view: ViewMatrices, low: ArrayLike, high: ArrayLike, near: float, far: float, margin: float = 0.0
 ) -> ViewMatrices:
     """Return a narrower perspective view from the same position: a rectangle of slopes, with a margin of texels.
 
@@ -220,7 +208,7 @@ def narrowed_view(
 
 
 def cube_views(
-    eye: npt.ArrayLike, near: float, far: float, resolution: int, margin: float = 0.0
+    eye: ArrayLike, near: float, far: float, resolution: int, margin: float = 0.0
 ) -> tuple[ViewMatrices, ...]:
     """Return the six views around a point, in the order of a cube map's faces (+x, -x, +y, -y, +z, -z).
 
@@ -244,7 +232,7 @@ def frustum_planes(view: ViewMatrices) -> Points:
     return found
 
 
-def box_planes(box: npt.ArrayLike) -> Points:
+def box_planes(box: ArrayLike) -> Points:
     """Return the planes (a, b, c, d) of a box, as in `frustum_planes`, shape (6, 4)."""
     low, high = np.asarray(box, np.float64)
     axes = np.eye(3)
@@ -265,7 +253,7 @@ def region_corners(planes: Points) -> Points:
 
 
 def sphere_bounds(
-    view: ViewMatrices, center: npt.ArrayLike, radius: float
+    view: ViewMatrices, center: ArrayLike, radius: float
 ) -> tuple[tuple[int, int, int, int], tuple[float, float]]:
     """Return the part of a view's picture that a sphere covers: x, y, width, height in texels, and depth bounds.
 
@@ -313,15 +301,12 @@ def frustum_corners(view: ViewMatrices, near: float | None = None, far: float | 
     inverse = np.linalg.inv(view.projection @ view.view)
     corners = []
     for distance in (near, far):
-        clip = view.projection @ np.array([0.0, 0.0, -distance, 1.0])
-        for y in (-1.0, 1.0):
-            for x in (-1.0, 1.0):
-                corner = inverse @ np.array([x * clip[3], y * clip[3], clip[2], clip[3]])
-                corners.append(corner[:3] / corner[3])
-    return np.array(corners)
+        _, _, z, w = view.projection @ np.array([0.0, 0.0, -distance, 1.0])
+        corners += [inverse @ np.array([x * w, y * w, z, w]) for y in (-1.0, 1.0) for x in (-1.0, 1.0)]
+    return np.array([corner[:3] / corner[3] for corner in corners])
 
 
-def box_corners(box: npt.ArrayLike) -> Points:
+def box_corners(box: ArrayLike) -> Points:
     """Return the eight corners of a box, shape (8, 3), z fastest."""
     box = np.asarray(box, np.float64)
     return np.array([[box[x, 0], box[y, 1], box[z, 2]] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
@@ -347,6 +332,6 @@ def clip_polygon(polygon: Points, planes: Points) -> Points:
     return np.array(corners, np.float64).reshape(-1, 3)
 
 
-def visible_part(view: ViewMatrices, box: npt.ArrayLike) -> Points:
+def visible_part(view: ViewMatrices, box: ArrayLike) -> Points:
     """Return points whose convex hull is the visible part of a box, shape (n, 3); none if it is not visible."""
     return region_corners(np.concatenate([frustum_planes(view), box_planes(box)]))

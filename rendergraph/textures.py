@@ -236,10 +236,7 @@ class TextureDesc(Struct, frozen=True, gc=False):
     @property
     def bytes(self) -> int:
         """Bytes of all mips, layers and samples by formula; a driver may pad."""
-        texels = 0
-        for mip in range(self.mips):
-            width, height = self.mip_size(mip)
-            texels += width * height * self.mip_layers(mip)
+        texels = sum(math.prod(self.mip_size(mip)) * self.mip_layers(mip) for mip in range(self.mips))
         return texels * self.samples * FORMATS[self.format].bytes
 
     def mip_size(self, mip: int) -> tuple[int, int]:

@@ -10,34 +10,29 @@ from collections.abc import Callable, Collection, Container, Iterable, Mapping, 
 from contextlib import ExitStack
 from functools import cached_property
 from itertools import chain, pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msgspec import Struct, field
 from msgspec.structs import replace
 
 from rendergraph import activity
+from rendergraph.allocate import ResourcePlan
+from rendergraph.compile.bindings import ViewBuffers
 from rendergraph.compile.checks import uniform_mismatch
-from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES
-from rendergraph.compile.memory import Call
+from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES, GpuScene
+from rendergraph.compile.memory import Call, Memory
 from rendergraph.compile.reuse import Reuse, Source
 from rendergraph.compile.scene_buffers import TEXELS
+from rendergraph.compile.transfers import UploadedValues
 from rendergraph.expand import CAMERA
+from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
+from rendergraph.gl.queries import OcclusionQuery, Timer
 from rendergraph.gl.state import Pieces, changes
 from rendergraph.program import prefix, used_blocks, used_names
 from rendergraph.schedule.dependencies import StepKey, touched_ids
 from rendergraph.steps import Read, Step, UniformValue
 from rendergraph.steps.model import FunctionBinding
-
-if TYPE_CHECKING:
-    from rendergraph.allocate import ResourcePlan
-    from rendergraph.compile.bindings import ViewBuffers
-    from rendergraph.compile.gpu_scene import GpuScene
-    from rendergraph.compile.memory import Memory
-    from rendergraph.compile.transfers import UploadedValues
-    from rendergraph.gl.device import Device
-    from rendergraph.gl.queries import OcclusionQuery, Timer
-
 
 _MOST_PARTS = 64
 """Maximum number of cached lists of some of the steps."""

@@ -41,7 +41,7 @@ class TextureGenerator(Struct, eq=False):
         key = text.text, source.generated.values
         if key not in self._kept:
             self._kept[key] = self._evaluate(text, source.generated)
-            while len(self._kept) > 1 and sum(map(_bytes, self._kept.values())) > _MOST_KEPT:
+            while len(self._kept) > 1 and sum(t.nbytes for m in self._kept.values() for t in m.values()) > _MOST_KEPT:
                 self._kept.pop(next(iter(self._kept)))
         return self._kept[key][source.generated.map]
 
@@ -66,10 +66,6 @@ class TextureGenerator(Struct, eq=False):
         finally:
             for image in images:
                 textures.delete(device, image)
-
-
-def _bytes(maps: Maps) -> int:
-    return sum(texels.nbytes for texels in maps.values())
 
 
 def _text(shader: Path) -> StageText:

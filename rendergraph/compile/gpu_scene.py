@@ -100,7 +100,8 @@ class GpuScene(Struct, eq=False, dict=True):
     _images: dict[tuple[ImageSource, bool], GpuTexture] = {}
     _sampled: set[tuple[ImageSource, bool]] = set()
     _samplers: dict[tuple[str, ...], int] = {}
-    _blocks: dict[str, tuple[moderngl.Buffer, bool]] = {}
+    _blocks: dict[str, moderngl.Buffer] = {}
+    _stored: set[str] = set()  # the blocks that are storage blocks
     _environment: GpuTexture | None = None
     _before: moderngl.Buffer | None = None
     _data: SceneBuffers | None = None
@@ -118,10 +119,10 @@ class GpuScene(Struct, eq=False, dict=True):
                 self._streams[name] = (self._buffer(array.tobytes()), layout)
         self._indices = {"triangles": self._mesh_indices(packed.indices, packed.meshes, moderngl.TRIANGLES)}
         self._instances = self._buffer(packed.instances.tobytes() or bytes(64))
-        stored = storage_blocks(packed, self.device.limits["uniform_block"])
         for block, records in pack.blocks(packed).items():
             if records.size:
-                self._blocks[block] = (self._buffer(records.tobytes()), block in stored)
+                self._blocks[block] = self._buffer(records.tobytes())
+        self._stored = self._blocks.keys() & storage_blocks(packed, self.device.limits["uniform_block"])
         if packed.vertex_orders:
             from rendergraph.compile.posing import Posing  # only for animated meshes
 
@@ -152,14 +153,10 @@ class GpuScene(Struct, eq=False, dict=True):
         """Macros about objects and materials, for geometry steps."""
         return scene_macros(self.scene, self.packed, self._stored)
 
-    @property
-    def _stored(self) -> set[str]:
-        return {name for name, (_, storage) in self._blocks.items() if storage}
-
     def bind(self) -> None:
         """Bind lights and materials to their binding points; once per frame."""
-        for name, (buffer, storage) in self._blocks.items():
-            if storage:
+        for name, buffer in self._blocks.items():
+            if name in self._stored:
                 buffer.bind_to_storage_buffer(FIXED_BLOCKS[name])
             else:
                 self.device.bind_block(buffer, FIXED_BLOCKS[name])
@@ -177,7 +174,7 @@ class GpuScene(Struct, eq=False, dict=True):
             ("environment_block", packed.environment, self.packed.environment),
         ):
             if block in self._blocks and now is not before and now.tobytes() != before.tobytes():
-                self._blocks[block][0].write(now.tobytes())
+                self._blocks[block].write(now.tobytes())
                 self.changes[block] += 1
         if packed.instances is not self.packed.instances:
             changed = changed_objects(self.scene, scene)
@@ -196,10 +193,10 @@ class GpuScene(Struct, eq=False, dict=True):
                     write_records(self._data.buffers[INSTANCES], self._data.instances, moved)
                 if self._tree is not None:
                     trees, buffer = self._tree
-                    trees = self._mesh_trees() if has_posed else trees
-                    buffer.write(object_rows(packed, self.data.instances["flags"], trees).tobytes())
                     if has_posed:
+                        trees = self._mesh_trees()
                         buffer.write(trees.rows.tobytes(), offset=buffer.size - trees.rows.nbytes)
+                    buffer.write(object_rows(packed, self.data.instances["flags"], trees).tobytes())
                     self._tree = trees, buffer
         for section in moving_plugin_keys(scene) & _SECTIONS.keys():
             pairs = zip(getattr(self.scene, section), getattr(scene, section), strict=True)
@@ -357,14 +354,12 @@ class GpuScene(Struct, eq=False, dict=True):
 
     def _upload(self, pixels: npt.NDArray[Any], *, srgb: bool) -> GpuTexture:
         height, width = pixels.shape[:2]
-        if pixels.dtype == np.uint8:
-            format_name = "srgb8_a8" if srgb else "rgba8"
-        else:
-            format_name = "rgba32f" if pixels.dtype == np.float32 else "rgba16f"
+        bytes_format, is_bytes = "srgb8_a8" if srgb else "rgba8", pixels.dtype == np.uint8
+        format_name = bytes_format if is_bytes else "rgba32f" if pixels.dtype == np.float32 else "rgba16f"
         desc = TextureDesc("texture2d", format_name, width, height, mips=full_mip_count(width, height))
         made = textures.create(self.device, desc, "a material texture")
         textures.upload(self.device, made, pixels)
-        if pixels.dtype == np.uint8:
+        if is_bytes:
             self.device.raw.glGenerateTextureMipmap(made.glo)
         else:
             textures.fill_mips(self.device, made)

@@ -7,27 +7,23 @@ same one with other parameters, replaces the one that computed them.
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
+import moderngl
 from msgspec import Struct, field
 
-from rendergraph.compile.executable import step_uniforms
+from rendergraph.compile.executable import Executable, step_uniforms
 from rendergraph.expand import SCENE_DATA
 from rendergraph.gl import textures
+from rendergraph.gl.device import Device
 from rendergraph.gl.textures import GpuTexture
 from rendergraph.schedule.dependencies import touched_ids
 from rendergraph.textures import BufferDesc
 
-if TYPE_CHECKING:
-    import moderngl
-
-    from rendergraph.compile.executable import Executable
-    from rendergraph.gl.device import Device
-
 Content: TypeAlias = Hashable
 """Everything that determines the contents of a kept resource: if equal, all bits are equal."""
 
-_Held: TypeAlias = "GpuTexture | moderngl.Buffer"
+_Held: TypeAlias = GpuTexture | moderngl.Buffer
 
 
 class KeptValues(Struct, eq=False):

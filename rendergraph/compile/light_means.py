@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import moderngl
 from msgspec import Struct, field
 from msgspec.structs import replace
 
+from rendergraph.allocate import ResourcePlan
+from rendergraph.compile.executable import Executable
 from rendergraph.compile.memory import Attachment, Call
 from rendergraph.gl import state as gl_state
 from rendergraph.gl import textures
@@ -18,10 +20,6 @@ from rendergraph.program.text import VERSION
 from rendergraph.resources import folder
 from rendergraph.steps import ADD, State
 from rendergraph.textures import Semantic, TextureDesc
-
-if TYPE_CHECKING:
-    from rendergraph.allocate import ResourcePlan
-    from rendergraph.compile.executable import Executable
 
 _ALL_BARRIERS = 0xFFFFFFFF
 

@@ -231,12 +231,13 @@ class Memory(Struct, eq=False, dict=True):
         else:  # a step that only stores images or buffers
             made = ctx.empty_framebuffer(size)
         self._owned.callback(made.release)
-        for number, color in enumerate(colors):
-            self._attach(made.glo, 0x8CE0 + number, color)
+        points = {0x8CE0 + number: color for number, color in enumerate(colors)}
         if depth is not None:
             if stencil:
                 raw.glNamedFramebufferTexture(made.glo, 0x8D00, 0, 0)
-            self._attach(made.glo, 0x821A if stencil else 0x8D00, depth)
+            points[0x821A if stencil else 0x8D00] = depth
+        for point, each in points.items():
+            textures.attach(self.device, made.glo, point, each.texture, each.mip, each.layer)
         status = raw.glCheckNamedFramebufferStatus(made.glo, 0x8D40)
         if status != 0x8CD5:
             every = " with ".join(str(target) for target in (*colors, depth) if target is not None)
@@ -269,13 +270,6 @@ class Memory(Struct, eq=False, dict=True):
             target = self.framebuffer([Attachment(texture, level, layer)], None, texture.desc.mip_size(level))
             calls += [target.use, clear_target(self.device, target, 0, texture.desc.format, value)]
         return calls
-
-    def _attach(self, framebuffer: int, point: int, attachment: Attachment) -> None:
-        texture, raw = attachment.texture, self.device.raw
-        if attachment.layer is None:
-            raw.glNamedFramebufferTexture(framebuffer, point, texture.glo, attachment.mip)
-        else:
-            raw.glNamedFramebufferTextureLayer(framebuffer, point, texture.glo, attachment.mip, attachment.layer)
 
     def _dummy(self, number: int, *, depth: bool) -> moderngl.Renderbuffer:
         key = (number, depth)

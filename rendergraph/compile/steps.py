@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Mapping
 from contextlib import ExitStack
 from functools import partial
@@ -212,11 +213,10 @@ class _Compiler(Struct, eq=False, dict=True):
 
     def _keep_units(self, steps: list[list[CompiledStep]]) -> None:
         """Give a sampler for which draws of one program bind different textures a unit of its own (see `Units`)."""
-        draws = [draw for compiled in steps for step in compiled for draw in step.all_draws]
-        users: dict[tuple[int, str], list[Draw]] = {}
-        for draw in draws:
+        users: defaultdict[tuple[int, str], list[Draw]] = defaultdict(list)
+        for draw in (draw for compiled in steps for step in compiled for draw in step.all_draws):
             for name in draw.uniforms:
-                users.setdefault((draw.program.glo, name), []).append(draw)
+                users[draw.program.glo, name].append(draw)
         for (_, name), using in users.items():
             samplers = {draw.textures[name][1] for draw in using if name in draw.textures}
             alike = len(samplers) == 1 and all(name in draw.textures for draw in using)

@@ -13,6 +13,7 @@ import struct
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from ctypes import addressof
 from functools import reduce
 from operator import and_
 from typing import Any
@@ -120,7 +121,7 @@ class Vulkan:
         flags = 0x10 if desc.kind == "texture_cube" else 0
         kind, depth, layers = (2, desc.layers, 1) if desc.kind == "texture3d" else (1, 1, desc.layers)
         size = (desc.width, desc.height, depth, desc.mips, layers)
-        asked = (14, _address(external), flags, kind, _FORMATS[desc.format], *size, desc.samples, 0, uses, 0, 0, 0, 0)
+        asked = (14, addressof(external), flags, kind, _FORMATS[desc.format], *size, desc.samples, 0, uses, 0, 0, 0, 0)
         image, found = ctypes.c_uint64(), (ctypes.c_uint64 * 3)()
         _call(self._library, "vkCreateImage", self._device, _packed("@I P 13I P I", *asked), None, ctypes.byref(image))
         self._library.vkGetImageMemoryRequirements(self._device, image, found)
@@ -135,13 +136,13 @@ class Vulkan:
         chosen = next((number for number in able if table[1 + 2 * number] & 1), able[0])
         exported = _packed("@I P I", 1000072002, 0, _OPAQUE_FD)
         memory, descriptor = ctypes.c_uint64(), ctypes.c_int(-1)
-        asked = _packed("@I P Q I", 5, _address(exported), size, chosen)
+        asked = _packed("@I P Q I", 5, addressof(exported), size, chosen)
         _call(self._library, "vkAllocateMemory", self._device, asked, None, ctypes.byref(memory))
         self._library.vkGetDeviceProcAddr.restype = ctypes.c_void_p
         address = self._library.vkGetDeviceProcAddr(self._device, b"vkGetMemoryFdKHR")
         get = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(address)
         asked = _packed("@I P Q I", 1000074002, 0, memory.value, _OPAQUE_FD)
-        result = get(self._device, _address(asked), ctypes.addressof(descriptor))
+        result = get(self._device, addressof(asked), addressof(descriptor))
         self._library.vkFreeMemory(self._device, memory, None)  # the descriptor keeps the memory
         if result:
             raise NoMemoryObjects(f"vkGetMemoryFdKHR failed ({result})")
@@ -158,14 +159,14 @@ def open_vulkan(identity: bytes) -> Iterator[Vulkan]:
     instance, device = ctypes.c_void_p(), ctypes.c_void_p()
     application = _packed("@I P P I P I I", 0, 0, 0, 0, 0, 0, 1 << 22 | 1 << 12)
     with _no_layer():
-        asked = _packed("@I P I P I P I P", 1, 0, 0, _address(application), 0, 0, 0, 0)
+        asked = _packed("@I P I P I P I P", 1, 0, 0, addressof(application), 0, 0, 0, 0)
         _call(library, "vkCreateInstance", asked, None, ctypes.byref(instance))
     try:
         physical = _same_device(library, instance, identity)
         priority = ctypes.c_float(1.0)
-        queue = _packed("@I P I I I P", 2, 0, 0, 0, 1, ctypes.addressof(priority))
+        queue = _packed("@I P I I I P", 2, 0, 0, 0, 1, addressof(priority))
         names = (ctypes.c_char_p * 1)(b"VK_KHR_external_memory_fd")
-        asked = _packed("@I P I I P I P I P P", 3, 0, 0, 1, _address(queue), 0, 0, 1, _address(names), 0)
+        asked = _packed("@I P I I P I P I P P", 3, 0, 0, 1, addressof(queue), 0, 0, 1, addressof(names), 0)
         _call(library, "vkCreateDevice", physical, asked, None, ctypes.byref(device))
         try:
             yield Vulkan(library, physical, device)
@@ -182,7 +183,7 @@ def _same_device(library: Any, instance: Any, identity: bytes) -> Any:
     library.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), devices)
     for handle in devices:
         names = ctypes.create_string_buffer(struct.pack("@I P", 1000071004, 0), 80)
-        properties = ctypes.create_string_buffer(struct.pack("@I P", 1000059001, _address(names)), 2048)
+        properties = ctypes.create_string_buffer(struct.pack("@I P", 1000059001, addressof(names)), 2048)
         library.vkGetPhysicalDeviceProperties2(ctypes.c_void_p(handle), properties)
         if names.raw[16:32] == identity:
             return ctypes.c_void_p(handle)
@@ -205,10 +206,6 @@ def _no_layer() -> Iterator[None]:
 
 def _packed(form: str, *values: int) -> Any:
     return ctypes.create_string_buffer(struct.pack(form, *values))
-
-
-def _address(structure: Any) -> int:
-    return ctypes.addressof(structure)
 
 
 def _call(library: Any, name: str, *arguments: Any) -> None:

@@ -92,6 +92,16 @@ class Program(Struct, eq=False):
     storage: dict[str, int] = field(default_factory=dict)
     storage_bytes: dict[str, int] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        self.blocks |= {name: index for index, (name, _) in enumerate(_resources(self, _UNIFORM_BLOCK))}
+        for index, (name, (least,)) in enumerate(_resources(self, _STORAGE_BLOCK, _BUFFER_DATA_SIZE)):
+            self.storage[name], self.storage_bytes[name] = index, least
+        properties = _TYPE, _ARRAY_SIZE, _BLOCK_INDEX, _LOCATION
+        for name, (kind, size, block, location) in _resources(self, _UNIFORM, *properties):
+            if block == -1:
+                name = name.removesuffix("[0]")
+                self.uniforms[name] = Uniform(name, kind, size, location)
+
     @property
     def glo(self) -> int:
         return int(self.object.glo)
@@ -108,8 +118,7 @@ class Program(Struct, eq=False):
 
     def writer(self, name: str, value: UniformValue) -> Callable[[], None] | None:
         """Return a call that writes one uniform, None if the program does not use it."""
-        uniform = self.uniforms.get(name)
-        if uniform is None:
+        if (uniform := self.uniforms.get(name)) is None:
             return None
         if uniform.is_opaque:
             return partial(self.device.raw.glProgramUniform1i, self.glo, uniform.location, int(value))  # type: ignore[arg-type]
@@ -117,13 +126,12 @@ class Program(Struct, eq=False):
         dtype = np.float32 if not uniform.is_integer else np.uint32 if function.endswith("uiv") else np.int32
         data = np.ascontiguousarray(value, dtype).ravel()
         count = max(1, data.size // uniform.number_count)
-        arguments: tuple[int, ...] = (self.glo, uniform.location, min(count, uniform.size))
-        if "Matrix" in function:
-            arguments = (*arguments, 0)  # not transposed
+        transposed = (0,) if "Matrix" in function else ()
         member = self.object.get(name, None) if count == uniform.size == 1 else None
         if isinstance(member, moderngl.Uniform) and data.itemsize == 4:
             return partial(member.write, data.tobytes())  # half the time of a call through ctypes
-        write = partial(getattr(self.device.raw, function), *arguments, data.ctypes.data)
+        where = self.glo, uniform.location, min(count, uniform.size)
+        write = partial(getattr(self.device.raw, function), *where, *transposed, data.ctypes.data)
         write.data = data  # type: ignore[attr-defined]  # the array travels with the call: its address stays good
         return write
 
@@ -165,9 +173,7 @@ def link(
         raise
     finally:
         device.raw.glDeleteProgram(before)
-    program = Program(device, made, texts)
-    _inspect(program)
-    return program
+    return Program(device, made, texts)
 
 
 def _in_storage(text: str, blocks: Collection[str]) -> str:
@@ -192,8 +198,7 @@ def _delete_leftovers(raw: RawGL, before: int) -> None:
 def driver_message(error: Exception) -> tuple[str | None, str]:
     """Return stage (`vertex`, … or None for linking) and the driver's own text from moderngl's error."""
     text = str(error)
-    match = re.search(r"(vertex|fragment|geometry|compute)_shader\s*\n=+\n(.*)", text, re.DOTALL)
-    if match:
+    if match := re.search(r"(vertex|fragment|geometry|compute)_shader\s*\n=+\n(.*)", text, re.DOTALL):
         return match[1], match[2].strip()
     return None, re.sub(r"^.*?\n=+\n", "", text, count=1, flags=re.DOTALL).strip()
 
@@ -207,18 +212,6 @@ def member_offsets(program: Program, block: str) -> dict[str, int]:
     """Return the byte offsets of the active members of a storage block, by their names as in `sparks[0].age`."""
     found = _resources(program, _BUFFER_VARIABLE, _BLOCK_INDEX, _OFFSET)
     return {name: offset for name, (index, offset) in found if index == program.storage[block]}
-
-
-def _inspect(program: Program) -> None:
-    program.blocks |= {name: index for index, (name, _) in enumerate(_resources(program, _UNIFORM_BLOCK))}
-    for index, (name, (least,)) in enumerate(_resources(program, _STORAGE_BLOCK, _BUFFER_DATA_SIZE)):
-        program.storage[name], program.storage_bytes[name] = index, least
-    for name, (kind, size, block, location) in _resources(
-        program, _UNIFORM, _TYPE, _ARRAY_SIZE, _BLOCK_INDEX, _LOCATION
-    ):
-        if block == -1:
-            name = name.removesuffix("[0]")
-            program.uniforms[name] = Uniform(name, kind, size, location)
 
 
 def _resources(program: Program, interface: int, *properties: int) -> Iterator[tuple[str, list[int]]]:

@@ -10,16 +10,14 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
+import moderngl
 from msgspec import Struct
 
 from rendergraph.errors import Problem, RenderError
 from rendergraph.gl.raw import RawGL
 from rendergraph.steps import Compare, State, Stencil
-
-if TYPE_CHECKING:
-    import moderngl
 
 _COMPARE = {name: 0x200 + number for number, name in enumerate(get_args(Compare))}
 _STENCIL_OP = {

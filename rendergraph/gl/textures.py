@@ -174,6 +174,14 @@ def _bands(layers: int, height: int, row: int) -> Iterator[tuple[int, int, int, 
             yield layer, 1, low, min(rows, height - low)
 
 
+def attach(device: Device, framebuffer: int, point: int, texture: GpuTexture, mip: int, layer: int | None) -> None:
+    """Attach one layer of a mip level to a framebuffer, or with None all of it."""
+    if layer is None:
+        device.raw.glNamedFramebufferTexture(framebuffer, point, texture.glo, mip)
+    else:
+        device.raw.glNamedFramebufferTextureLayer(framebuffer, point, texture.glo, mip, layer)
+
+
 def _resolved(device: Device, texture: GpuTexture) -> GpuTexture:
     """Return a new texture with one sample per texel.
 
@@ -190,10 +198,7 @@ def _resolved(device: Device, texture: GpuTexture) -> GpuTexture:
         (raw.glEnable if srgb else raw.glDisable)(0x8DB9)
         for layer in range(desc.layers):
             for framebuffer, attached in ((source, texture), (target, made)):
-                if desc.kind == "texture2d":
-                    raw.glNamedFramebufferTexture(framebuffer, point, attached.glo, 0)
-                else:
-                    raw.glNamedFramebufferTextureLayer(framebuffer, point, attached.glo, 0, layer)
+                attach(device, framebuffer, point, attached, 0, layer if desc.kind != "texture2d" else None)
             box = (0, 0, desc.width, desc.height)
             raw.glBlitNamedFramebuffer(source, target, *box, *box, mask, 0x2600)
     finally:
@@ -263,13 +268,7 @@ class Clear:
     """
 
     def __init__(
-        self,
-        device: Device,
-        texture: GpuTexture,
-        value: ClearValue,
-        *,
-        mip: int | None = None,
-        layer: int | None = None,
+        self, device: Device, texture: GpuTexture, value: ClearValue, mip: int | None = None, layer: int | None = None
     ) -> None:
         desc = texture.desc
         gl_format, gl_type, dtype, channels = transfer_format(desc.format)
