@@ -228,8 +228,7 @@ def frustum_planes(view: ViewMatrices) -> Points:
     planes = np.array([rows[3] + sign * rows[axis] for axis in (0, 1, 2) for sign in (1.0, -1.0)])
     lengths = np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
     last = 5 if math.isinf(view.far) or lengths[5, 0] == 0.0 else 6
-    found: Points = planes[:last] / lengths[:last]
-    return found
+    return np.asarray(planes[:last] / lengths[:last])
 
 
 def box_planes(box: ArrayLike) -> Points:

@@ -2,21 +2,10 @@
 
 from __future__ import annotations
 
-from rendergraph.compile.executable import CompiledStep, Executable
+from rendergraph.compile.executable import Executable
 from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.compile.kept import KeptValues
 from rendergraph.compile.memory import TexturePool
 from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.steps import compile_plan
 from rendergraph.compile.transfers import SCENE_CHANGES
-
-__all__ = [
-    "SCENE_CHANGES",
-    "CompiledStep",
-    "Executable",
-    "GpuScene",
-    "KeptValues",
-    "ProgramCache",
-    "TexturePool",
-    "compile_plan",
-]

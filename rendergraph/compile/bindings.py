@@ -123,8 +123,6 @@ class ViewBuffers(Struct, eq=False, dict=True):
     def release(self) -> None:
         for buffer in (*self._buffers.values(), *self._before.values(), self._frame):
             buffer.release()
-        self._buffers.clear()
-        self._before.clear()
 
 
 class Units(Struct, eq=False):

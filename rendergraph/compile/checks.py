@@ -179,12 +179,8 @@ def check_attributes(step: Step, program: Program, given: Mapping[str, str], tex
 
 def attributes_of(program: Program) -> dict[str, str]:
     """Return a program's vertex attributes with `f`, `i` or `d` for the numeric type."""
-    members = program.object
-    return {
-        name: members[name].shape
-        for name in members
-        if type(members[name]).__name__ == "Attribute" and not name.startswith("gl_")
-    }
+    members = {name: program.object[name] for name in program.object if not name.startswith("gl_")}
+    return {name: member.shape for name, member in members.items() if type(member).__name__ == "Attribute"}
 
 
 def _placed(problem: Problem, name: str, texts: Texts) -> Problem:

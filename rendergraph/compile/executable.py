@@ -410,10 +410,10 @@ class Executable(Struct, eq=False, dict=True):
         """
         for step in self.steps[0]:
             names = {"time"} if step.step.kind == "fullscreen" else {"time", "delta_time"}
-            for draw in step.all_draws:
-                texts = draw.program.texts.values() if "frame_block" in draw.program.block_names else ()
-                if any(not names.isdisjoint(used_names(text)) for text in texts):
-                    return True
+            programs = [draw.program for draw in step.all_draws if "frame_block" in draw.program.block_names]
+            texts = (text for program in programs for text in program.texts.values())
+            if any(not names.isdisjoint(used_names(text)) for text in texts):
+                return True
         return False
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TypeAlias
 
@@ -50,10 +51,11 @@ class TextureGenerator(Struct, eq=False):
         side = values.pop("resolution")
         program = self.programs.get({"compute": text}, {}, ())
         images = []
-        try:
+        with ExitStack() as made:
             for unit, name in enumerate(_FORMATS):
                 desc = TextureDesc("texture2d", name, side, side)
                 images.append(textures.create(device, desc, "a generated texture"))
+                made.callback(textures.delete, device, images[unit])
                 texel_format = 0x8814 if name == "rgba32f" else 0x8058
                 device.raw.glBindImageTexture(unit, images[unit].glo, 0, 0, 0, _READ_WRITE, texel_format)
             for phase in (0, 1):
@@ -63,9 +65,6 @@ class TextureGenerator(Struct, eq=False):
                 program.object.run(-(-side // 8), -(-side // 8))
                 device.raw.glMemoryBarrier(_ALL_BARRIERS)
             return {name: np.ascontiguousarray(textures.read(device, images[n])[0][::-1]) for name, n in _MAPS.items()}
-        finally:
-            for image in images:
-                textures.delete(device, image)
 
 
 def _text(shader: Path) -> StageText:

@@ -268,17 +268,14 @@ class GpuScene(Struct, eq=False, dict=True):
     def indices(self, topology: str) -> MeshIndices:
         """Return the indices of `triangles`, or of `triangles_adjacency`, which are computed on first use."""
         if topology not in self._indices:
-            self._indices[topology] = self._mesh_indices(
-                *pack.with_adjacency(self.packed), mode=moderngl.TRIANGLES_ADJACENCY
-            )
+            indices, meshes = pack.with_adjacency(self.packed)
+            self._indices[topology] = self._mesh_indices(indices, meshes, moderngl.TRIANGLES_ADJACENCY)
         return self._indices[topology]
 
     def vertex_array(self, programs: ProgramCache, program: Program, topology: str) -> Any:
         """Return a vertex array with the streams that a program uses, transforms per instance, and the index buffer."""
         names = set(program.object)
-        content: list[tuple[Any, ...]] = [
-            (buffer, layout, name) for name, (buffer, layout) in self._streams.items() if name in names
-        ]
+        content: list[tuple[Any, ...]] = [(*stream, name) for name, stream in self._streams.items() if name in names]
         content += [(*self._constant(name), name) for name in _ABSENT if name in names and name not in self._streams]
         for formats in (_INSTANCE_FORMAT, _PREVIOUS_FORMAT):
             used = [name for name, _ in formats if name in names]

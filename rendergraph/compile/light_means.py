@@ -104,8 +104,8 @@ class LightMeans(Struct, eq=False):
             )
             vertex_array = device.ctx.vertex_array(program, [])
             self._programs[samples, define] = program, vertex_array
-            for made in (program, vertex_array):
-                self.executable.owned.callback(made.release)
+            self.executable.owned.callback(program.release)
+            self.executable.owned.callback(vertex_array.release)
         program, vertex_array = self._programs[samples, define]
         state = State(blend=ADD if adds else None)
         self.executable.memory.framebuffer([Attachment(target)], None, target.desc.size).use()

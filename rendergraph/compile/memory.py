@@ -127,11 +127,10 @@ class Memory(Struct, eq=False, dict=True):
         blocks = make_blocks(self.device, descs)
         for block in blocks:
             self._owned.callback(block.release)
-        left = iter(blocks)
         try:
             for physical in self.plan.physicals:
                 if physical.block:
-                    self.physicals.append(next(left))
+                    self.physicals.append(blocks.pop(0))
                 elif self.plan.resources[physical.members[0]].role == "scene":
                     self.physicals.append(self.of_scene(physical.members[0]))
                 elif isinstance(physical.desc, BufferDesc):

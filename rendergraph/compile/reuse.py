@@ -12,7 +12,6 @@ then looked up.
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TypeAlias
@@ -141,9 +140,9 @@ class Reuse(Struct, eq=False, dict=True):
     @cached_property
     def _goals(self) -> list[_Held]:
         """The values required at the end of a frame: outputs, and history for the next frame."""
-        shown = set(self.plan.schedule.outputs.values())
-        shown |= {id for id in self._versions.writers if self.plan.resources[id].role == "history"}
-        return [self._at(id, last) for id in sorted(shown) if (last := self._last(id)) is not None and self._moves(id)]
+        shown, writers = set(self.plan.schedule.outputs.values()), self._versions.writers
+        written = [id for id in sorted(writers) if id in shown or self.plan.resources[id].role == "history"]
+        return [self._at(id, max(writers[id])) for id in written if self._moves(id)]
 
     @cached_property
     def _looking_back(self) -> set[int]:
@@ -177,14 +176,9 @@ class Reuse(Struct, eq=False, dict=True):
         """Return whether a resource is computed in each frame, unlike kept ones and those of the scene."""
         return self.plan.resources[id].role not in ("kept", "scene")
 
-    def _last(self, id: str) -> int | None:
-        return next(reversed(self._versions.writers.get(id, {})), None)
-
     def _before(self, id: str, version: int) -> int | None:
         """Return the last version below this one that a step writes; None if there is none."""
-        made = list(self._versions.writers.get(id, ()))
-        found = bisect_right(made, version - 1)
-        return made[found - 1] if found else None
+        return max((made for made in self._versions.writers.get(id, ()) if made < version), default=None)
 
     def _at(self, id: str, version: int) -> _Held:
         history = self.plan.resources[id].role == "history"

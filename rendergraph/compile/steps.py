@@ -43,14 +43,6 @@ from rendergraph.schedule import step_names
 from rendergraph.steps import Read, Step, Write
 from rendergraph.textures import FORMATS, TextureDesc
 
-_TOPOLOGY = {
-    "points": moderngl.POINTS,
-    "lines": moderngl.LINES,
-    "line_strip": moderngl.LINE_STRIP,
-    "triangles": moderngl.TRIANGLES,
-    "triangle_strip": moderngl.TRIANGLE_STRIP,
-    "triangles_adjacency": moderngl.TRIANGLES_ADJACENCY,
-}
 _ALL_BARRIERS = 0xFFFFFFFF
 _DRAW_INDIRECT_BUFFER, _PARAMETER_BUFFER, _UNSIGNED_INT = 0x8F3F, 0x80EE, 0x1405
 _COMMAND_BYTES = 20  # of a draw command, with a last integer that is ignored without indices
@@ -246,7 +238,7 @@ class _Compiler(Struct, eq=False, dict=True):
         index = self.memory.buffer(step.indices, parity) if step.indices else None
         key = (id(self.memory), "draw", index and index.glo, *names, *(layout for layout, _ in step.attributes))
         vertex_array = self.programs.vertex_array(program, key, content, index)
-        mode = _TOPOLOGY[step.topology]
+        mode: int = getattr(moderngl, step.topology.upper())
         if isinstance(step.vertices, str):
             source = self.memory.buffer(step.vertices, parity)
             call: Call = partial(vertex_array.render_indirect, source, mode, step.commands, first=step.command)

@@ -166,10 +166,8 @@ def open_device(index: int | None = None) -> Device:
         index: EGL device number as listed by `doctor`; None for RENDERGRAPH_DEVICE, or else the default.
     """
     if first_process() != os.getpid():
-        text = (
-            "OpenGL was used before this process was forked, and drivers do not survive a fork; "
-            "start new processes instead, as multiprocessing does with 'spawn'"
-        )
+        text = "OpenGL was used before this process was forked, and drivers do not survive a fork; "
+        text += "start new processes instead, as multiprocessing does with 'spawn'"
         raise DeviceError(Problem("RG611", text))
     if index is None:
         named = os.environ.get("RENDERGRAPH_DEVICE", "0")
@@ -293,10 +291,8 @@ def check_memory(device: Device, needed: int, allowed: int | None = None) -> Non
     else:
         return
     if needed > limit:
-        text = (
-            f"the plan needs {needed / 2**20:.0f} MiB of textures, {limit / 2**20:.0f} MiB may be used{of}; "
-            f"a smaller --size helps, --limit plan-memory=MiB allows more, as does {MEMORY_LIMIT}"
-        )
+        text = f"the plan needs {needed / 2**20:.0f} MiB of textures, {limit / 2**20:.0f} MiB may be used{of}; "
+        text += f"a smaller --size helps, --limit plan-memory=MiB allows more, as does {MEMORY_LIMIT}"
         raise RenderError(Problem("RG616", text))
 
 

@@ -198,9 +198,8 @@ def _no_layer() -> Iterator[None]:
     try:
         yield
     finally:
-        if before is None:
-            del os.environ["NODEVICE_SELECT"]
-        else:
+        del os.environ["NODEVICE_SELECT"]
+        if before is not None:
             os.environ["NODEVICE_SELECT"] = before
 
 

@@ -58,17 +58,13 @@ class Uniform(Struct, frozen=True):
         return _SAMPLERS.get(self.type, "an opaque type") if self.is_opaque else _VALUES[self.type][0]
 
     @property
-    def writer(self) -> str:
-        return f"glProgramUniform{_VALUES[self.type][1]}"
-
-    @property
     def number_count(self) -> int:
         ending = _VALUES[self.type][1]
         return int(ending[-3]) ** 2 if "Matrix" in ending else int(ending[0])
 
     @property
     def is_integer(self) -> bool:
-        return not self.is_opaque and not self.writer.endswith("fv")
+        return not self.is_opaque and not _VALUES[self.type][1].endswith("fv")
 
     @property
     def is_opaque(self) -> bool:
@@ -122,7 +118,7 @@ class Program(Struct, eq=False):
             return None
         if uniform.is_opaque:
             return partial(self.device.raw.glProgramUniform1i, self.glo, uniform.location, int(value))  # type: ignore[arg-type]
-        function = uniform.writer
+        function = f"glProgramUniform{_VALUES[uniform.type][1]}"
         dtype = np.float32 if not uniform.is_integer else np.uint32 if function.endswith("uiv") else np.int32
         data = np.ascontiguousarray(value, dtype).ravel()
         count = max(1, data.size // uniform.number_count)

@@ -91,12 +91,9 @@ def _stencil(raw: RawGL, stencil: Stencil | None) -> Iterator[Call]:
 
 
 def changes(before: Pieces | None, after: Pieces) -> list[Call]:
-    """Return the calls of `after` that differ from those of `before`."""
-    if before is None:
-        return [call for calls in after.values() for call in calls]
-    return [
-        call for key, calls in after.items() if _describe(calls) != _describe(before.get(key, ())) for call in calls
-    ]
+    """Return the calls of `after` that differ from those of `before`, or all."""
+    now = before or {}
+    return [call for key, calls in after.items() if _describe(calls) != _describe(now.get(key, ())) for call in calls]
 
 
 def _describe(calls: tuple[Call, ...]) -> list[tuple[int, tuple[object, ...]]]:

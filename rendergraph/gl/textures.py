@@ -65,10 +65,8 @@ def create(device: Device, desc: TextureDesc, label: str = "", *, memory: int | 
     error = raw.error()
     if error:
         raw.delete("glDeleteTextures", glo)
-        text = (
-            f"the driver could not allocate {label or 'a texture'}: {desc.width}x{desc.height} {desc.format}, "
-            f"{desc.layers} layers, {desc.samples} samples, {desc.bytes / 2**20:.0f} MiB ({error})"
-        )
+        text = f"the driver could not allocate {label or 'a texture'}: {desc.width}x{desc.height} {desc.format}, "
+        text += f"{desc.layers} layers, {desc.samples} samples, {desc.bytes / 2**20:.0f} MiB ({error})"
         raise RenderError(Problem("RG612", text))
     device.textures_made += 1
     return GpuTexture(glo, target, desc)
