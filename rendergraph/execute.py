@@ -50,8 +50,6 @@ from rendergraph.typecheck import Range, quoted
 _Scissor: TypeAlias = Annotated[tuple[int, int, Count, Count], "x, y, width and height in texels"]
 _Part: TypeAlias = Annotated[float, Range(-1, 1)]
 _Offset: TypeAlias = Annotated[tuple[_Part, _Part], "x and y in texels, from -1 to 1"]
-
-
 _MOMENT_STRIDE = 100_003
 _CHANGES = {"camera": "", "parameters": "", "size": "", **SCENE_CHANGES}
 
