@@ -30,46 +30,28 @@ from rendergraph.errors import (
 from rendergraph.version import __version__
 
 _MODULES = {
-    "authoring": ("init", "copy", "new-node", "check-node"),
+    "run": ("run",),
+    "view": ("view", "gallery"),
+    "inspection": ("check", "plan", "graph", "config", "diff"),
     "edit": ("edit", "upgrade"),
-    "inspection": ("check", "plan", "graph", "config", "diff", "schema"),
+    "compare": ("compare",),
+    "sweep": ("sweep", "farm"),
+    "bench": ("bench",),
     "lists": ("nodes", "pipelines", "scenes", "environments"),
+    "explain": ("explain", "schema"),
+    "authoring": ("init", "copy", "new-node", "check-node"),
+    "doctor": ("doctor",),
+    "mcp": ("mcp",),
 }
-"""Modules with several verbs; any other verb is the function `command` of the module of its name."""
-VERBS = (
-    "run",
-    "view",
-    "gallery",
-    "check",
-    "plan",
-    "graph",
-    "config",
-    "diff",
-    "edit",
-    "upgrade",
-    "compare",
-    "sweep",
-    "farm",
-    "bench",
-    *_MODULES["lists"],
-    "explain",
-    "schema",
-    "init",
-    "copy",
-    "new-node",
-    "check-node",
-    "doctor",
-    "mcp",
-)
-"""In the order of `--help`."""
+VERBS = {verb: module for module, verbs in _MODULES.items() for verb in verbs}
+"""The module of each verb, in the order of `--help`; the verb is the function of its name there."""
 
 INTERRUPTED = 130
 
 
 def verb(name: str) -> click.Command:
-    module = next((module for module, verbs in _MODULES.items() if name in verbs), name)
-    function = "command" if module == name else name.replace("-", "_")
-    found: click.Command = getattr(importlib.import_module(f"rendergraph.cli.{module}"), function)
+    module = importlib.import_module(f"rendergraph.cli.{VERBS[name]}")
+    found: click.Command = getattr(module, name.replace("-", "_"))
     return found
 
 

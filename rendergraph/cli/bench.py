@@ -23,14 +23,7 @@ if TYPE_CHECKING:
 @options.json_option
 @options.device_option
 @options.draw_timeout_option
-def command(
-    selection: Selection,
-    frames: int,
-    steps: bool,
-    as_json: bool,
-    device: int | None,
-    **modes: Any,
-) -> None:
+def bench(selection: Selection, frames: int, steps: bool, as_json: bool, device: int | None, **modes: Any) -> None:
     """Time each pass.
 
     Prints the median time of each pass over all frames, with its spread. All of the pipeline's outputs are computed.
@@ -45,9 +38,7 @@ def command(
     from rendergraph.session import RenderOptions, stages
     from rendergraph.session.gpu import Gpu
 
-    linked = stages.link(stages.resolve(selection))
-    warn(linked.warnings)
-    expanded = stages.expand(linked, RenderOptions(range(1, frames + 1), timed=True, **modes))
+    expanded = stages.expand(options.link(selection), RenderOptions(range(1, frames + 1), timed=True, **modes))
     with Gpu(device) as gpu:
         frame = stages.draw_last(expanded, gpu)
     warn(frame.warnings)

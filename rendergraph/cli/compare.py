@@ -154,7 +154,7 @@ report_options = options.together(
     help="Magnify this part of the picture in a figure: left, top, width and height in pixels.",
 )
 @report_options
-def command(
+def compare(
     pipelines: tuple[str, ...],
     withs: tuple[tuple[str, ...], ...],
     reference: str | None,

@@ -21,7 +21,7 @@ NO_DEVICE = 5
 
 @click.command("doctor")
 @options.json_option
-def command(as_json: bool) -> None:
+def doctor(as_json: bool) -> None:
     """Check devices, drivers and versions.
 
     Lists each GL device with its features, and what to install if something is missing. Exits 5 if no device is usable.

@@ -40,7 +40,7 @@ _dry_run = click.option("--dry-run", is_flag=True, help="Show the difference, an
 @_dry_run
 @options.plugin_option
 @options.json_option
-def command(
+def edit(
     file: Path, operation: str, words: tuple[str, ...], dry_run: bool, plugins: tuple[Path, ...], as_json: bool
 ) -> None:
     """Change a pipeline file: its nodes, links and parameters.
@@ -66,7 +66,6 @@ def command(
     least, most, shown = _OPERATIONS[operation]
     if not least <= len(words) <= most or (operation == "insert" and len(words) == 4):
         raise UsageError(Problem("RG500", f"expected `rendergraph edit FILE {operation} {shown}`"))
-    from rendergraph.catalog import Catalog
     from rendergraph.document import parse
     from rendergraph.errors import Option
 
@@ -83,8 +82,7 @@ def command(
         given = (words[0], words[1:])
     elif operation == "set":
         given = (words[0], value(words[1]))
-    catalog = Catalog.discover(plugins)
-    warn(catalog.notes)
+    catalog = options.find_catalog(plugins)
     before, pipeline = _opened(file, catalog)
     getattr(pipeline, operation)(*given)
     _finish(pipeline, before, dry_run, plugins, as_json)

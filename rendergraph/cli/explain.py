@@ -1,10 +1,12 @@
-"""`rendergraph explain`: the reference manual in the terminal."""
+"""`rendergraph explain` and `schema`: the reference manual in the terminal, and the schemas of files."""
 
 from __future__ import annotations
 
+import json
 import re
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,8 +20,12 @@ from rendergraph.formatting import format_value
 from rendergraph.resources import shipped_pipelines, shipped_scenes
 
 if TYPE_CHECKING:
+    from rendergraph.catalog import Catalog
     from rendergraph.cli.options import Select
+    from rendergraph.session.values import Linked
+    from rendergraph.typecheck import Schema
 
+_SCHEMAS = ("pipeline", "scene", "sweep", "results", "results-csv")
 Entry = dict[str, Any]
 """Facts about a topic, as `--json` prints them."""
 
@@ -36,7 +42,7 @@ Entry = dict[str, Any]
 @click.option("--step", type=click.IntRange(min=0), metavar="N", help="Step of the node, numbered as by `plan`.")
 @options.selection_options
 @options.json_option
-def command(topic: str, glsl: bool, pipeline: str | None, step: int | None, select: Select, as_json: bool) -> None:
+def explain(topic: str, glsl: bool, pipeline: str | None, step: int | None, select: Select, as_json: bool) -> None:
     """Explain a node, pipeline, scene, error or file format.
 
     TOPIC may also be an environment. `pipeline`, `scene`, `sweep`, `settings` and `header` list every key of that kind
@@ -61,67 +67,92 @@ def command(topic: str, glsl: bool, pipeline: str | None, step: int | None, sele
     plugins = select(topic).plugins
     if not glsl and (pipeline or step is not None or select(topic) != Selection(topic, plugins=plugins)):
         raise UsageError(Problem("RG500", "--pipeline, --step and options that change a pipeline require --glsl"))
-    if pipeline is not None:
-        entry = reference.describe_program(options.link(select(pipeline)), topic, step)
-        _print(entry, _program_text, as_json)
-    elif re.fullmatch(r"[Rr][Gg]\d+", topic):
+    if pipeline is None and re.fullmatch(r"[Rr][Gg]\d+", topic):
         _print(reference.error_page(topic.upper()), _error_text, as_json)
-    elif topic in reference.FILE_KINDS:
+    elif pipeline is None and topic in reference.FILE_KINDS:
         extensions = options.extensions(plugins) if topic == "scene" else None
         _print({"file": topic, "keys": reference.file_keys(topic, extensions)}, _keys_text, as_json)
-    else:
-        _node_or_file(topic, plugins, select, glsl=glsl, step=step, as_json=as_json)
-
-
-def _node_or_file(
-    topic: str, plugins: tuple[Path, ...], select: Select, *, glsl: bool, step: int | None, as_json: bool
-) -> None:
-    """Explain a node type, a pipeline or a scene; a name that is both a node type and a file is explained as both."""
-    from rendergraph.catalog import SHADERS, Catalog
-
-    catalog = Catalog.discover(plugins)
-    warn(catalog.notes)
-    if topic.endswith(SHADERS):
-        catalog = catalog.with_file(topic, Path(topic))
-    file, file_text = ({}, "") if glsl else _file(topic, select, catalog)
-    if topic not in catalog:
-        if not file and not glsl:
-            file, file_text = _environment(topic)
-        if not file and not glsl and (file := reference.describe_python(topic)):
-            file_text = _python_text(file)
-        if not file:
-            raise InputError(Problem("RG511", _unknown(topic, catalog.names(), SHADERS)))
-        emit_json(file) if as_json else emit(file_text)
-        return
-    node_type = catalog.get(topic)
-    if glsl:
-        linked, node = reference.find_node_of_type(node_type, catalog, select)
+    elif glsl:
+        linked, node = _node(topic, pipeline, select, plugins, partial(_unknown, topic))
         _print(reference.describe_program(linked, node, step), _program_text, as_json)
-        return
-    described = reference.describe_node(node_type, catalog.extensions)
-    described["example"] = reference.example_text(node_type, catalog)
-    if any("added" in parameter for parameter in described["parameters"]):
-        warn(catalog.extensions.warnings)
-    warn(node_type.warnings)
-    _print(file | described, lambda entry: sections(_node_text(entry), file_text), as_json)
+    else:
+        _node_or_file(topic, plugins, select, as_json)
+
+
+def _node(
+    name: str,
+    pipeline: str | None,
+    select: Select,
+    plugins: tuple[Path, ...],
+    unknown: Callable[[Iterable[str]], str],
+) -> tuple[Linked, str]:
+    """Return a pipeline and the id of a node in it: a node of `--pipeline`, or that of a type in its example."""
+    if pipeline is not None:
+        return options.link(select(pipeline)), name
+    catalog = options.find_catalog(plugins, name)
+    if name not in catalog:
+        raise InputError(Problem("RG511", unknown(catalog.names())))
+    return reference.find_node_of_type(catalog.get(name), catalog, select)
+
+
+def _node_or_file(topic: str, plugins: tuple[Path, ...], select: Select, as_json: bool) -> None:
+    """Explain what a name refers to; one that is both a node type and a file is explained as both."""
+    catalog = options.find_catalog(plugins, topic)
+    entry, text = _other(topic, select, catalog)
+    if topic in catalog:
+        node_type = catalog.get(topic)
+        entry |= reference.describe_node(node_type, catalog.extensions)
+        entry["example"] = reference.example_text(node_type, catalog)
+        if any("added" in parameter for parameter in entry["parameters"]):
+            warn(catalog.extensions.warnings)
+        warn(node_type.warnings)
+        text = sections(_node_text(entry), text)
+    elif not entry:
+        raise InputError(Problem("RG511", _unknown(topic, catalog.names())))
+    emit_json(entry) if as_json else emit(text)
+
+
+def _other(topic: str, select: Select, catalog: Catalog) -> tuple[Entry, str]:
+    """Describe what is no node type, also as text; empty if there is nothing of the name."""
+    kind = reference.kind_of(topic)
+    if kind == "pipeline":
+        entry = reference.describe_pipeline(topic, options.link(select(topic)))
+        return entry, _pipeline_text(entry)
+    if kind == "scene":
+        from rendergraph.scene.load import load
+
+        path = shipped_scenes().get(topic) or Path(topic)
+        scene = load(path, extensions=catalog.extensions)
+        warn(scene.warnings)
+        entry = reference.describe_scene(topic, path, scene)
+        return entry, _scene_text(entry)
+    if topic in catalog:
+        return {}, ""
+    from rendergraph.scene.environments import SHIPPED  # slower to import than what most topics need
+
+    if topic in SHIPPED:
+        use = f"rendergraph run forward --environment {topic}\nenvironment: {{file: {topic}}}  # in a scene file"
+        text = sections(f"{topic}  (environment)", SHIPPED[topic], section("Use it", use))
+        return {"environment": topic, "line": SHIPPED[topic]}, text
+    entry = reference.describe_python(topic)
+    return entry, _python_text(entry) if entry else ""
 
 
 def _print(entry: Entry, text_of: Callable[[Entry], str], as_json: bool) -> None:
     emit_json(entry) if as_json else emit(text_of(entry))
 
 
-def _unknown(topic: str, types: Any, shader_suffixes: tuple[str, ...]) -> str:
-    shader = next((f"./{topic}{suffix}" for suffix in shader_suffixes if Path(f"{topic}{suffix}").is_file()), None)
+def _unknown(topic: str, types: Iterable[str]) -> str:
+    from rendergraph.catalog import SHADERS
     from rendergraph.scene.environments import SHIPPED
 
     names = [*types, *reference.FILE_KINDS, *shipped_pipelines(), *shipped_scenes(), *SHIPPED]
     if topic in names:
         return f"'{topic}' has no program; --glsl takes a node type, or a node of --pipeline"
-    names += [*reference.public_names(), "api", "glsl"]
-    hint = f"; did you mean '{shader}'?" if shader else suggestion(topic, names)
-    return f"unknown name '{topic}'{hint}" + (
-        "" if shader else "; `nodes`, `pipelines`, `scenes` and `environments` list names"
-    )
+    if shader := next((f"./{topic}{suffix}" for suffix in SHADERS if Path(f"{topic}{suffix}").is_file()), None):
+        return f"unknown name '{topic}'; did you mean '{shader}'?"
+    hint = suggestion(topic, [*names, *reference.public_names(), "api", "glsl"])
+    return f"unknown name '{topic}'{hint}; `nodes`, `pipelines`, `scenes` and `environments` list names"
 
 
 def _python_text(entry: Entry) -> str:
@@ -136,32 +167,93 @@ def _python_text(entry: Entry) -> str:
     return sections(f"{entry['name']}  (Python)", entry["signature"], entry["doc"], *members)
 
 
-def _environment(topic: str) -> tuple[Entry, str]:
-    """Describe a shipped environment, also as text; empty if the topic is not one."""
-    from rendergraph.scene.environments import SHIPPED  # slower to import than what most topics need
+@click.command("schema")
+@click.argument("what", default="pipeline", metavar="[pipeline|scene|sweep|results|results-csv|FILE|NODE]")
+@click.option("--glsl", is_flag=True, help="Print a shader of NODE as a complete file, for a GLSL checker.")
+@click.option("--shader", metavar="NAME", help="Shader to print, if the node has several; requires --glsl.")
+@click.option(
+    "--pipeline",
+    metavar="PIPELINE",
+    shell_complete=options.offered("pipelines"),
+    help="Pipeline that contains the node NODE; requires --glsl.",
+)
+@options.plugin_option
+@click.option("-o", "--output", type=options.NamedPath(dir_okay=False), metavar="FILE", help="Write a file.")
+@options.json_option
+def schema(
+    what: str,
+    glsl: bool,
+    shader: str | None,
+    pipeline: str | None,
+    plugins: tuple[Path, ...],
+    output: Path | None,
+    as_json: bool,
+) -> None:
+    """Print the JSON Schema of a kind of file, or a whole shader.
 
-    if topic not in SHIPPED:
-        return {}, ""
-    use = f"rendergraph run forward --environment {topic}\nenvironment: {{file: {topic}}}  # in a scene file"
-    shown = sections(f"{topic}  (environment)", SHIPPED[topic], section("Use it", use))
-    return {"environment": topic, "line": SHIPPED[topic]}, shown
+    The schema of pipelines contains all installed nodes, and the contents of shipped pipelines for files that extend
+    them. If FILE is a pipeline, its schema also contains what it extends, its shader files, and the links that fit each
+    input of its nodes. A node type with errors is included by name only, with a warning. `results` describes the lines
+    of a sweep's results.jsonl; `results-csv` is a Table Schema of its results.csv.
+
+    With --glsl, NODE is a node type, shown in a small pipeline, a shader file, or a node of --pipeline. The file
+    contains everything that rendergraph adds and all includes. Every line keeps its number, so messages of another
+    compiler name the lines that you wrote.
+
+    \b
+    Examples:
+      rendergraph schema -o rendergraph.schema.json
+      rendergraph schema scene -o scene.schema.json
+      rendergraph schema results
+      rendergraph schema my.yaml -o rendergraph.schema.json
+      rendergraph schema --glsl tonemap
+      rendergraph schema --glsl ao --pipeline ssao-gtao --shader gtao.frag
+    """
+    from rendergraph.session import Selection
+
+    def unknown(types: Iterable[str]) -> str:
+        return f"there is no node type '{what}'" + (suggestion(what, types, most=0) or "; a node's id needs --pipeline")
+
+    if (shader or pipeline) and not glsl:
+        raise UsageError(Problem("RG500", "--shader and --pipeline require --glsl"))
+    if glsl:
+        linked, node = _node(what, pipeline, partial(Selection, plugins=plugins), plugins, unknown)
+        options.put(reference.complete_shader(linked, node, shader), output, as_json=as_json)
+        return
+    if what in ("results", "results-csv"):
+        from rendergraph.compare.export.table import csv_schema  # slower to import than the rest
+        from rendergraph.compare.store import line_schema
+
+        document = line_schema() if what == "results" else csv_schema()
+    elif what in ("scene", "sweep"):
+        from rendergraph.keys import as_markdown, file_schema
+
+        extensions = options.extensions(plugins) if what == "scene" else None
+        document = as_markdown(file_schema(reference.table_of(what, extensions)))
+    else:
+        document = _of_pipelines(what, plugins)
+    options.put(json.dumps(document, indent=2, ensure_ascii=False), output, as_json=as_json)
 
 
-def _file(topic: str, select: Select, catalog: Any) -> tuple[Entry, str]:
-    """Describe the pipeline or scene that a topic names, also as text; empty if it names neither."""
-    kind = reference.kind_of(topic)
-    if kind == "pipeline":
-        entry = reference.describe_pipeline(topic, options.link(select(topic)))
-        return entry, _pipeline_text(entry)
-    if kind == "scene":
-        from rendergraph.scene.load import load
+def _of_pipelines(what: str, plugins: tuple[Path, ...]) -> Schema:
+    from rendergraph.schema import Links, base_of, schema, shipped_bases
+    from rendergraph.session import Selection, stages
 
-        path = shipped_scenes().get(topic) or Path(topic)
-        scene = load(path, extensions=catalog.extensions)
-        warn(scene.warnings)
-        entry = reference.describe_scene(topic, path, scene)
-        return entry, _scene_text(entry)
-    return {}, ""
+    if what != "pipeline" and not Path(what).suffix:
+        raise InputError(Problem("RG511", f"unknown schema '{what}'{suggestion(what, _SCHEMAS)}"))
+    catalog = options.find_catalog(plugins)
+    bases = shipped_bases(catalog)
+    links: Links = {}
+    if what != "pipeline":
+        resolved = stages.resolve(Selection(what, plugins=plugins), catalog)
+        spec = resolved.spec
+        bases |= base_of(Path(what), spec)
+        catalog = spec.catalog or catalog  # with the shader files it names
+        links = stages.fitting_links(resolved)
+    document = schema(catalog, bases, links)
+    warn([problem.as_warning() for problem in catalog.usable()[1]])
+    warn(catalog.extensions.warnings)
+    return document
 
 
 # --- text ------------------------------------------------------------------------------------------------------------
@@ -277,16 +369,11 @@ def _range(parameter: Entry) -> str:
 
 
 _SCOPE_TITLES = {
-    "textures": "textures",
-    "uniforms": "uniforms",
     "blocks": "blocks, views and tables",
-    "macros": "macros",
     "functions": "functions of other nodes, and their providers",
     "includes": "included files, and what they declare",
-    "attributes": "attributes",
-    "varyings": "varyings",
-    "outputs": "outputs",
 }
+"""Of sections that are not called as their key."""
 _WIDE = 64
 
 
@@ -306,7 +393,7 @@ def _program_text(entry: Entry) -> str:
     for title, members in groupby(entry["scope"], key=lambda one: one["section"]):
         rows = [(one["name"], one["source"]) for one in members]
         width = max((len(name) for name, _ in rows if len(name) < _WIDE), default=0)
-        lines += ["", _SCOPE_TITLES[title]]
+        lines += ["", _SCOPE_TITLES.get(title, title)]
         for name, source in rows:
             if len(name) < _WIDE and width + len(source) < 2 * _WIDE:
                 lines.append(f"  {name.ljust(width)}  {source}")

@@ -1,26 +1,21 @@
-"""Verbs that inspect pipelines without a GPU: `check`, `plan`, `graph`, `config`, `diff`, `schema`."""
+"""Verbs that inspect pipelines without a GPU: `check`, `plan`, `graph`, `config`, `diff`."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import replace
 
-from rendergraph import reference
 from rendergraph.cli import options
 from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import amount, emit, emit_json, say, warn
-from rendergraph.errors import InputError, Problem, UsageError, suggestion
 from rendergraph.formatting import format_bytes
 
 if TYPE_CHECKING:
     from rendergraph.session import Selection
-    from rendergraph.typecheck import Schema
 
 _FORMATS = {".txt": "text", ".dot": "dot", ".gv": "dot", ".mmd": "mermaid", ".svg": "svg"}
-_KINDS = ("pipeline", "scene", "sweep", "results", "results-csv")
 
 
 @click.command("check", no_args_is_help=True)
@@ -137,7 +132,7 @@ def graph(selection: Selection, format_name: str | None, output: Path | None, as
     """
     from rendergraph import diagrams
 
-    sketch = options.sketch(selection)
+    sketch = options.link(selection, sketch=True)
     if as_json and not output:
         missing = [problem.as_json() for problem in sketch.missing]
         emit_json(diagrams.graph_json(sketch.graph) | {"missing": missing})
@@ -215,7 +210,7 @@ def diff(a: str, b: str, select: options.Select, svg: Path | None, as_json: bool
     from rendergraph.diff import diff, diff_json, diff_svg, diff_text, figures
     from rendergraph.session import stages
 
-    old, new = (options.sketch(select(name)) for name in (a, b))
+    old, new = (options.link(select(name), sketch=True) for name in (a, b))
     difference = diff(old.graph, new.graph)
     missing = [problem.as_json() for problem in (*old.missing, *new.missing)]
     plans = None
@@ -231,110 +226,3 @@ def diff(a: str, b: str, select: options.Select, svg: Path | None, as_json: bool
     else:
         emit(written["svg"] if written else diff_text(difference, plans).rstrip("\n"))
     options.exit_if_missing(old, new)
-
-
-@click.command("schema")
-@click.argument("what", default="pipeline", metavar="[pipeline|scene|sweep|results|results-csv|FILE|NODE]")
-@click.option("--glsl", is_flag=True, help="Print a shader of NODE as a complete file, for a GLSL checker.")
-@click.option("--shader", metavar="NAME", help="Shader to print, if the node has several; requires --glsl.")
-@click.option(
-    "--pipeline",
-    metavar="PIPELINE",
-    shell_complete=options.offered("pipelines"),
-    help="Pipeline that contains the node NODE; requires --glsl.",
-)
-@options.plugin_option
-@click.option("-o", "--output", type=options.NamedPath(dir_okay=False), metavar="FILE", help="Write a file.")
-@options.json_option
-def schema(
-    what: str,
-    glsl: bool,
-    shader: str | None,
-    pipeline: str | None,
-    plugins: tuple[Path, ...],
-    output: Path | None,
-    as_json: bool,
-) -> None:
-    """Print the JSON Schema of a kind of file, or a whole shader.
-
-    The schema of pipelines contains all installed nodes, and the contents of shipped pipelines for files that extend
-    them. If FILE is a pipeline, its schema also contains what it extends, its shader files, and the links that fit each
-    input of its nodes. A node type with errors is included by name only, with a warning. `results` describes the lines
-    of a sweep's results.jsonl; `results-csv` is a Table Schema of its results.csv.
-
-    With --glsl, NODE is a node type, shown in a small pipeline, a shader file, or a node of --pipeline. The file
-    contains everything that rendergraph adds and all includes. Every line keeps its number, so messages of another
-    compiler name the lines that you wrote.
-
-    \b
-    Examples:
-      rendergraph schema -o rendergraph.schema.json
-      rendergraph schema scene -o scene.schema.json
-      rendergraph schema results
-      rendergraph schema my.yaml -o rendergraph.schema.json
-      rendergraph schema --glsl tonemap
-      rendergraph schema --glsl ao --pipeline ssao-gtao --shader gtao.frag
-    """
-    if (shader or pipeline) and not glsl:
-        raise UsageError(Problem("RG500", "--shader and --pipeline require --glsl"))
-    if glsl:
-        options.put(_shader(what, shader, pipeline, plugins), output, as_json=as_json)
-        return
-    if what in ("results", "results-csv"):
-        from rendergraph.compare.export.table import csv_schema  # slower to import than the rest
-        from rendergraph.compare.store import line_schema
-
-        document = line_schema() if what == "results" else csv_schema()
-    elif what in ("scene", "sweep"):
-        from rendergraph.keys import as_markdown, file_schema
-
-        extensions = options.extensions(plugins) if what == "scene" else None
-        document = as_markdown(file_schema(reference.table_of(what, extensions)))
-    else:
-        document = _of_pipelines(what, plugins)
-    options.put(json.dumps(document, indent=2, ensure_ascii=False), output, as_json=as_json)
-
-
-def _shader(what: str, shader: str | None, pipeline: str | None, plugins: tuple[Path, ...]) -> str:
-    from rendergraph.catalog import SHADERS, Catalog
-    from rendergraph.session import Selection
-
-    if pipeline is not None:
-        return reference.complete_shader(options.link(Selection(pipeline, plugins=plugins)), what, shader)
-    catalog = Catalog.discover(plugins)
-    warn(catalog.notes)
-    if what.endswith(SHADERS):
-        catalog = catalog.with_file(what, Path(what))
-    if what not in catalog:
-        hint = suggestion(what, catalog.names(), most=0) or "; a node's id needs --pipeline"
-        raise InputError(Problem("RG511", f"there is no node type '{what}'{hint}"))
-
-    def select(name: str) -> Selection:
-        return Selection(name, plugins=plugins)
-
-    linked, node = reference.find_node_of_type(catalog.get(what), catalog, select)
-    return reference.complete_shader(linked, node, shader)
-
-
-def _of_pipelines(what: str, plugins: tuple[Path, ...]) -> Schema:
-    from rendergraph.catalog import Catalog
-    from rendergraph.schema import Links, base_of, schema, shipped_bases
-    from rendergraph.session import Selection, stages
-
-    if what != "pipeline" and not Path(what).suffix:
-        text = f"unknown schema '{what}'{suggestion(what, _KINDS)}"
-        raise InputError(Problem("RG511", text))
-    catalog = Catalog.discover(plugins)
-    warn(catalog.notes)
-    bases = shipped_bases(catalog)
-    links: Links = {}
-    if what != "pipeline":
-        resolved = stages.resolve(Selection(what, plugins=plugins), catalog)
-        spec = resolved.spec
-        bases |= base_of(Path(what), spec)
-        catalog = spec.catalog or catalog  # with the shader files it names
-        links = stages.fitting_links(resolved)
-    document = schema(catalog, bases, links)
-    warn([problem.as_warning() for problem in catalog.usable()[1]])
-    warn(catalog.extensions.warnings)
-    return document

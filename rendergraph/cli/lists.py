@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -39,12 +40,6 @@ def _verb(kind: str, find: Callable[[], Mapping[str, Path | str]], hint: str) ->
     return click.command(kind)(options.json_option(command))
 
 
-def _environments() -> Mapping[str, str]:
-    from rendergraph.scene.environments import SHIPPED
-
-    return SHIPPED
-
-
 pipelines = _verb(
     "pipelines", shipped_pipelines, "`rendergraph run NAME` renders a pipeline, `rendergraph explain NAME` describes it"
 )
@@ -55,7 +50,7 @@ scenes = _verb(
 )
 environments = _verb(
     "environments",
-    _environments,
+    lambda: import_module("rendergraph.scene.environments").SHIPPED,
     "`rendergraph run PIPELINE --environment NAME` uses one, as does environment: {file: NAME} in a scene file",
 )
 
@@ -75,10 +70,7 @@ def nodes(family: str | None, plugins: tuple[Path, ...], as_json: bool) -> None:
       rendergraph nodes
       rendergraph nodes display --json
     """
-    from rendergraph.catalog import Catalog
-
-    catalog = Catalog.discover(plugins)
-    warn(catalog.notes)
+    catalog = options.find_catalog(plugins)
     families = catalog.families()
     if family is not None and family not in families:
         text = f"unknown family of nodes '{family}'{suggestion(family, filter(None, families))}"

@@ -42,7 +42,7 @@ _PATH_LIKE = re.compile(r"[^\s\[\]{}:,\"'=]+")
 @click.option("--root", type=click.Path(file_okay=False, exists=True), default=".", help="The folder to work in.")
 @click.option("--write", is_flag=True, help="Let the assistant write pictures and pipelines into the folder.")
 @click.option("--json", "as_json", is_flag=True, help="Print the settings that an assistant needs, as JSON, and exit.")
-def command(root: str, write: bool, as_json: bool) -> None:
+def mcp(root: str, write: bool, as_json: bool) -> None:
     """Serve a coding assistant over standard input and output.
 
     Offers `nodes`, `explain`, `check`, `plan`, `run`, `compare` and `texture` over the Model Context Protocol, in one

@@ -20,6 +20,7 @@ from rendergraph.errors import InputError
 from rendergraph.system import STDIN
 
 if TYPE_CHECKING:
+    from rendergraph.catalog import Catalog
     from rendergraph.declare import Extensions
     from rendergraph.session import Pipeline, Selection
     from rendergraph.session.values import Linked
@@ -349,12 +350,22 @@ def linked(selection: Selection) -> Pipeline:
     return pipeline
 
 
-def link(selection: Selection) -> Linked:
+def link(selection: Selection, *, sketch: bool = False) -> Linked:
+    """Resolve and link a pipeline, and print its warnings; node types may be missing in a `sketch`."""
     from rendergraph.session import stages
 
-    linked = stages.link(stages.resolve(selection))
+    linked = (stages.sketch if sketch else stages.link)(stages.resolve(selection))
     warn(linked.warnings)
     return linked
+
+
+def find_catalog(plugins: tuple[Path, ...], topic: str = "") -> Catalog:
+    """Return the available node types, with that of the shader file that a topic may name; print notes about them."""
+    from rendergraph.catalog import SHADERS, Catalog
+
+    catalog = Catalog.discover(plugins)
+    warn(catalog.notes)
+    return catalog.with_file(topic, Path(topic)) if topic.endswith(SHADERS) else catalog
 
 
 def extensions(plugins: tuple[Path, ...]) -> Extensions:
@@ -364,15 +375,6 @@ def extensions(plugins: tuple[Path, ...]) -> Extensions:
     found = Catalog.discover(plugins).extensions
     warn(found.warnings)
     return found
-
-
-def sketch(selection: Selection) -> Linked:
-    """Resolve and link a graph in which node types may be missing; print these and other warnings."""
-    from rendergraph.session import stages
-
-    linked = stages.sketch(stages.resolve(selection))
-    warn(linked.warnings)
-    return linked
 
 
 def exit_if_missing(*sketches: Linked) -> None:

@@ -79,7 +79,7 @@ if TYPE_CHECKING:
 @options.heap_option
 @click.option("--poison", is_flag=True, help="Overwrite textures after their last use, to reveal later reads.")
 @click.option("--shuffle", type=int, metavar="SEED", help="Run the steps in another legal order.")
-def command(
+def run(
     selection: Selection,
     frames: range | Literal["clip"] | None,
     seconds: float | None,
