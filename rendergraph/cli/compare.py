@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from rendergraph.cli import options
@@ -26,13 +24,9 @@ if TYPE_CHECKING:
 BEYOND = 4
 """Exit code of a comparison that exceeds a threshold."""
 _LIMITED = ("flip", "rmse", "radiance_rmse", "relative_mse")
-_TRUTH = ("noise", "samples", "seconds")
+Threshold: TypeAlias = tuple[str, float]
+"""A metric and the most that it may be."""
 SOFTWARE = "times on a software rasteriser: not comparable to a GPU"
-
-
-class Threshold(Struct, frozen=True):
-    metric: str
-    most: float
 
 
 def _threshold(text: str) -> Threshold:
@@ -45,12 +39,12 @@ def _threshold(text: str) -> Threshold:
         raise ValueError(f"'{text}' is not METRIC=NUMBER, as in flip=0.02")
     if metric in ("psnr", "ssim"):
         raise ValueError(f"{metric} falls as errors grow; use {', '.join(_LIMITED)}")
-    return Threshold(metric, most)
+    return metric, most
 
 
 def check_thresholds(thresholds: Sequence[Threshold], extensions: Extensions) -> None:
     names = [*_LIMITED, *(added.name for added in extensions.metrics())]
-    for metric in dict.fromkeys(one.metric for one in thresholds if one.metric not in names):
+    for metric in dict.fromkeys(metric for metric, _ in thresholds if metric not in names):
         text = f"--fail-above: unknown metric '{metric}'{suggestion(metric, names)}"
         raise UsageError([Problem("RG500", text), *extensions.problems])
 
@@ -66,13 +60,13 @@ def _crop(text: str) -> tuple[int, int, int, int]:
     return x, y, width, height
 
 
-reference_option = click.option(
-    "--reference",
-    metavar="FILE|PIPELINE[:PATH=VALUE,…]",
-    shell_complete=options.offered("pipelines"),
-    help="Measure against this picture or pipeline; the first by default.",
-)
-truth_options = options.together(
+measure_options = options.together(
+    click.option(
+        "--reference",
+        metavar="FILE|PIPELINE[:PATH=VALUE,…]",
+        shell_complete=options.offered("pipelines"),
+        help="Measure against this picture or pipeline; the first by default.",
+    ),
     click.option(
         "--reference-noise",
         type=click.FloatRange(0, min_open=True),
@@ -80,10 +74,7 @@ truth_options = options.together(
         help="Accumulate the reference until its noise is this fraction of the smallest error.  [default: 0.1]",
     ),
     click.option(
-        "--reference-samples",
-        type=click.IntRange(1),
-        metavar="N",
-        help="Maximum samples per pixel of the reference.",
+        "--reference-samples", type=click.IntRange(1), metavar="N", help="Maximum samples per pixel of the reference."
     ),
     click.option(
         "--reference-seconds",
@@ -91,13 +82,15 @@ truth_options = options.together(
         metavar="SECONDS",
         help="Maximum time to render the reference.  [default: 120]",
     ),
+    click.option(
+        "--metric",
+        metavar="NODE.PORT",
+        shell_complete=options.offered("ports"),
+        help="Measure this port's texture instead of the picture.",
+    ),
+    options.selection_options,
 )
-metric_option = click.option(
-    "--metric",
-    metavar="NODE.PORT",
-    shell_complete=options.offered("ports"),
-    help="Measure this port's texture instead of the picture.",
-)
+"""What is measured, and against what."""
 at_option = click.option(
     "--at",
     "frame",
@@ -133,10 +126,7 @@ report_options = options.together(
     shell_complete=options.offered("settings"),
     help="Add a variant with one or more settings. A single variant is compared with the unchanged pipeline.",
 )
-@reference_option
-@truth_options
-@metric_option
-@options.selection_options
+@measure_options
 @click.option("-n", "--frames", type=click.IntRange(1, 10_000), default=10, show_default=True, help="Measured frames.")
 @at_option
 @click.option(
@@ -184,13 +174,18 @@ def compare(
       rendergraph compare soft.png hard.png
       rendergraph compare forward-prepass --reference forward --size 160x90 --fail-above flip=0.02 --json
     """
+    from rendergraph.images import check_target
+
     if withs and len(pipelines) > 1:
         raise UsageError(Problem("RG500", "--with makes variants of one pipeline; name one, or write each as a file"))
     if len(pipelines) < 2 and reference is None and not withs:
         ways = "name another, a --reference, or settings: --with NODE.PARAM=VALUE"
         raise UsageError(Problem("RG500", f"there is only one pipeline and nothing to compare it with; {ways}"))
     if output is not None:
-        check_page(output, (".html", ".htm", *_FIGURES, ".tex", ".csv"))
+        if output.suffix.lower() not in (".html", ".htm", *_FIGURES, ".tex", ".csv"):
+            text = f"a report is an HTML page; name it '{output.with_suffix('.html')}'"
+            raise UsageError(Problem("RG501", f"{text}; figures end in .pdf, .svg or .png, tables in .tex or .csv"))
+        check_target(output)
         if output.suffix.lower() in _FIGURES:
             require("a figure", "figures", "matplotlib")
     elif title or note:
@@ -245,11 +240,11 @@ def _are_pictures(names: Sequence[str], reference: str | None, select: options.S
     from rendergraph.session.picture_metadata import is_picture
 
     source, context = click.core.ParameterSource, click.get_current_context()
-    drawn = {"frames", "frame", "device", "executor", *(f"reference_{name}" for name in _TRUTH)} & {
-        name for name in context.params if context.get_parameter_source(name) is source.COMMANDLINE
-    }
+    drawn = {"frames", "frame", "device", "executor", "reference_noise", "reference_samples", "reference_seconds"}
+    if any(context.get_parameter_source(name) is source.COMMANDLINE for name in drawn):
+        return False
     changed = select("") != Selection("", plugins=select("").plugins)
-    return not drawn and not changed and all(map(is_picture, [*names, *([reference] if reference else [])]))
+    return not changed and all(map(is_picture, [*names, *([reference] if reference else [])]))
 
 
 def _load(name: str, names: Sequence[str], select: options.Select) -> Pipeline:
@@ -333,42 +328,33 @@ def _write(comparison: Comparison, output: Path, crops: Sequence[Any], *, title:
     options.write(text, output)
 
 
-def check_page(output: Path, endings: Sequence[str] = (".html", ".htm")) -> None:
-    """Check, before anything is rendered, that a report can be written."""
-    from rendergraph.images import check_target
-
-    if output.suffix.lower() not in endings:
-        more = "; figures end in .pdf, .svg or .png, tables in .tex or .csv" if ".tex" in endings else ""
-        text = f"a report is an HTML page; name it '{output.with_suffix('.html')}'{more}"
-        raise UsageError(Problem("RG501", text))
-    check_target(output)
-
-
 def exceeded(results: Sequence[Result], thresholds: Sequence[Threshold]) -> list[str]:
     """Return a line for each value above its threshold; NaN and unknown values are above every one."""
     lines = []
     for result in results:
         values = {**result.metrics.as_json(), "radiance_rmse": result.radiance_rmse, **result.metrics.plugins}
         values["relative_mse"] = result.relative_mse
-        for threshold in thresholds:
-            value = values.get(threshold.metric) if not result.not_finite else math.nan
-            if value is None or not value <= threshold.most:
+        for metric, most in thresholds:
+            value = values.get(metric) if not result.not_finite else math.nan
+            if value is None or not value <= most:
                 shown = "unknown" if value is None else f"{value:.6g}"
-                lines.append(f"{result.name}: {threshold.metric} is {shown}, above {threshold.most:g}")
+                lines.append(f"{result.name}: {metric} is {shown}, above {most:g}")
     return lines
 
 
 def summary(results: Sequence[Result]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
     """Return the headings and a row for each variant: errors, times, passes, bytes; for pictures only errors."""
+    own = dict.fromkeys(name for result in results for name in result.columns)
     columns: list[tuple[str, Callable[[Result], object]]] = [
         ("", lambda r: r.name),
         ("FLIP", lambda r: f"{r.metrics.flip:.4f}"),
         ("RMSE", lambda r: f"{r.metrics.rmse:.4f}"),
-        *([("rel. MSE", _relative)] if any(result.relative_mse is not None for result in results) else []),
         ("PSNR", lambda r: "∞" if r.metrics.psnr is None else f"{r.metrics.psnr:.2f}"),
         ("SSIM", lambda r: f"{r.metrics.ssim:.4f}"),
-        *((name, partial(_figure, name)) for name in dict.fromkeys(n for result in results for n in result.columns)),
+        *((name, lambda r, name=name: _number(r.columns.get(name))) for name in own),
     ]
+    if any(result.relative_mse is not None for result in results):
+        columns.insert(3, ("rel. MSE", lambda r: _number(r.relative_mse)))
     if all(result.memory for result in results):
         columns.append(("GPU ms", lambda r: f"{r.times.gpu_ms.median:.2f}" if r.times.gpu_ms else "–"))
         columns.append(("10–90 %", lambda r: f"{gpu.p10:.2f}–{gpu.p90:.2f}" if (gpu := r.times.gpu_ms) else ""))
@@ -381,12 +367,7 @@ def summary(results: Sequence[Result]) -> tuple[tuple[str, ...], list[tuple[obje
     return tuple(name for name, _ in columns), rows
 
 
-def _relative(result: Result) -> str:
-    return "–" if result.relative_mse is None else f"{result.relative_mse:.4g}"
-
-
-def _figure(name: str, result: Result) -> str:
-    value = result.columns.get(name)
+def _number(value: float | None) -> str:
     return "–" if value is None else f"{value:.4g}"
 
 
@@ -411,12 +392,9 @@ def truth_lines(comparison: Comparison) -> list[str]:
     if reference.noise is None:
         return []
     part = f", {100 * share:.2g} % of the smallest error" if share is not None else ""
-    lines = [
-        f"noise of {reference.name} after {reference.samples} samples: relative MSE {reference.noise:.3g}{part}; "
-        f"FLIP {reference.flip_noise:.2g}"
-    ]
-    lines += [f"{result.name}: {result.cause}" for result in comparison.results if result.cause]
-    return lines
+    noise = f"relative MSE {reference.noise:.3g}{part}; FLIP {reference.flip_noise:.2g}"
+    causes = [f"{result.name}: {result.cause}" for result in comparison.results if result.cause]
+    return [f"noise of {reference.name} after {reference.samples} samples: {noise}", *causes]
 
 
 def _difference(comparison: Comparison, result: Result) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from rendergraph import reference
 from rendergraph.cli.lazy_click import click
@@ -18,23 +18,19 @@ if TYPE_CHECKING:
     from rendergraph.session.values import Linked
 
 Context = click.Context
-Complete: TypeAlias = "Callable[[Context, click.Parameter, str], list[CompletionItem]]"
 _BREAKS = "=:"
 """The word breaks of bash that occur in settings: bash completes the text after the last one."""
 
 
-def _words(find: Callable[[Context, str], Iterable[str]], *, or_files: bool = False) -> Complete:
-    """Return a completion callback for click, which offers the words of `find` that begin with the typed text."""
+def complete(kind: str, ctx: Context, incomplete: str) -> list[CompletionItem]:
+    """Return the words of a kind that begin with the typed text."""
+    from click.shell_completion import CompletionItem
 
-    def complete(ctx: Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        from click.shell_completion import CompletionItem
-
-        items = [CompletionItem(word) for word in find(ctx, incomplete) if word.startswith(incomplete)]
-        if or_files and incomplete and ("/" in incomplete or "." in incomplete or any(Path().glob(f"{incomplete}*"))):
-            items.append(CompletionItem(incomplete, type="file"))  # the shell lists files itself
-        return items
-
-    return complete
+    items = [CompletionItem(word) for word in _WORDS[kind](ctx, incomplete) if word.startswith(incomplete)]
+    is_path = incomplete and ("/" in incomplete or "." in incomplete or any(Path().glob(f"{incomplete}*")))
+    if is_path and kind in _OR_FILES:
+        items.append(CompletionItem(incomplete, type="file"))  # the shell lists files itself
+    return items
 
 
 def _topics(ctx: Context, incomplete: str) -> list[str]:
@@ -84,15 +80,18 @@ def _ports(ctx: Context, incomplete: str) -> list[str]:
     return [str(end) for end, info in linked.graph.textures.items() if info.desc is not None] if linked else []
 
 
-def _taps(ctx: Context, incomplete: str) -> list[str]:
-    return [f"{port}=" for port in _ports(ctx, incomplete)]
-
-
-pipelines = _words(lambda ctx, incomplete: shipped_pipelines(), or_files=True)
-scenes = _words(lambda ctx, incomplete: shipped_scenes(), or_files=True)
-environments = _words(_environments, or_files=True)
-topics = _words(_topics, or_files=True)
-families, cameras, settings, ports, taps = map(_words, (_families, _cameras, _settings, _ports, _taps))
+_WORDS: dict[str, Callable[[Context, str], Iterable[str]]] = {
+    "pipelines": lambda ctx, incomplete: shipped_pipelines(),
+    "scenes": lambda ctx, incomplete: shipped_scenes(),
+    "environments": _environments,
+    "topics": _topics,
+    "families": _families,
+    "cameras": _cameras,
+    "settings": _settings,
+    "ports": _ports,
+    "taps": lambda ctx, incomplete: [f"{port}=" for port in _ports(ctx, incomplete)],
+}
+_OR_FILES = ("pipelines", "scenes", "environments", "topics")
 
 
 def _values(linked: Linked, node: str, name: str) -> Iterator[str]:

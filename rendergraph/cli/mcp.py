@@ -15,8 +15,9 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import data_stream, emit_json
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
     from mcp.server import MCPServer
 
     from rendergraph.session import Pipeline
-
-T = TypeVar("T")
 
 MOST_SIDE = 1024  # pictures travel in messages, and a CPU may have to render them
 _INSTRUCTIONS = """Renderers are YAML files, whose nodes are render passes. A `pipeline` is a shipped name (`forward`),
@@ -78,36 +77,40 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
     worker = ThreadPoolExecutor(1, thread_name_prefix="rendergraph-mcp")
     made = MCPServer("rendergraph", instructions=_INSTRUCTIONS, version=__version__, log_level="ERROR")
 
-    tool = made.tool(structured_output=False)
+    def tool(work: Callable[..., Any]) -> None:
+        """Offer a function as a tool: it runs in the worker; its errors give the assistant the place of each mistake."""
 
-    async def drawn(work: Callable[[], T]) -> T:
-        try:
-            return await asyncio.get_running_loop().run_in_executor(worker, work)
-        except (RendergraphError, KeyError) as error:  # its text gives the assistant the place of each mistake
-            raise ToolError(str(error)) from None
+        @wraps(work)
+        async def call(*arguments: Any, **keywords: Any) -> Any:
+            try:
+                return await asyncio.get_running_loop().run_in_executor(worker, partial(work, *arguments, **keywords))
+            except (RendergraphError, KeyError) as error:
+                raise ToolError(str(error)) from None
+
+        made.tool(structured_output=False)(call)
 
     @tool
-    async def nodes() -> str:
+    def nodes() -> str:
         """List the node types by family, each with a summary."""
-        return await drawn(lambda: _verb("nodes"))
+        return _verb("nodes")
 
     @tool
-    async def explain(topic: str) -> str:
+    def explain(topic: str) -> str:
         """Explain a node type, a pipeline, a scene, an error code, a kind of file (`pipeline`, `scene`) or `api`."""
-        return await drawn(lambda: _verb("explain", *_inside(root, topic)))
+        return _verb("explain", *_inside(root, topic))
 
     @tool
-    async def check(pipeline: str, settings: list[str] | None = None) -> str:
+    def check(pipeline: str, settings: list[str] | None = None) -> str:
         """Find all mistakes in a pipeline without rendering it, each with its place and fix."""
-        return await drawn(lambda: _verb("check", *_words(root, pipeline, settings), text=pipeline))
+        return _verb("check", *_words(root, pipeline, settings), text=pipeline)
 
     @tool
-    async def plan(pipeline: str, settings: list[str] | None = None) -> str:
+    def plan(pipeline: str, settings: list[str] | None = None) -> str:
         """Print the order of passes, and the memory of their textures."""
-        return await drawn(lambda: _verb("plan", *_words(root, pipeline, settings), text=pipeline))
+        return _verb("plan", *_words(root, pipeline, settings), text=pipeline)
 
     @tool
-    async def run(
+    def run(
         pipeline: str,
         settings: list[str] | None = None,
         size: tuple[int, int] = (480, 270),
@@ -115,18 +118,14 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
         output: str | None = None,
     ) -> list[Any]:
         """Render a pipeline and return its picture; `output` writes it to a file, if the server may write."""
-
-        def work() -> list[Any]:
-            target = _target(root, output, write=write)
-            found = _pipeline(root, pipeline, settings, size).render(frames=range(frame, frame + 1))
-            shown = [f"{one['node']} ({one['type']})" for one in found.passes]
-            saved = f"; written to {found.save(target)}" if target is not None else ""
-            return [f"{found!r}; passes: {', '.join(shown)}{saved}", Image(data=found._repr_png_(), format="png")]
-
-        return await drawn(work)
+        target = _target(root, output, write=write)
+        found = _pipeline(root, pipeline, settings, size).render(frames=range(frame, frame + 1))
+        shown = [f"{one['node']} ({one['type']})" for one in found.passes]
+        saved = f"; written to {found.save(target)}" if target is not None else ""
+        return [f"{found!r}; passes: {', '.join(shown)}{saved}", Image(data=found._repr_png_(), format="png")]
 
     @tool
-    async def texture(
+    def texture(
         pipeline: str,
         port: str,
         settings: list[str] | None = None,
@@ -135,58 +134,44 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
         channel: int | None = None,
     ) -> list[Any]:
         """Return the texture of any port (`ao.occlusion`) as a picture in false colours, with its range and mean."""
-
-        def work() -> list[Any]:
-            found = _pipeline(root, pipeline, settings, size).render(taps=[port])
-            shown, values = found.show(port, layer=layer, channel=channel), found[port]
-            text = f"{shown!r}; shape {values.shape}, {values.dtype}, least {values.min():g}, greatest {values.max():g}"
-            return [f"{text}, mean {values.mean():g}", Image(data=shown.png, format="png")]
-
-        return await drawn(work)
+        found = _pipeline(root, pipeline, settings, size).render(taps=[port])
+        shown, values = found.show(port, layer=layer, channel=channel), found[port]
+        text = f"{shown!r}; shape {values.shape}, {values.dtype}, least {values.min():g}, greatest {values.max():g}"
+        return [f"{text}, mean {values.mean():g}", Image(data=shown.png, format="png")]
 
     @tool
-    async def compare(
+    def compare(
         pipelines: list[str],
         settings: list[list[str]] | None = None,
         reference: str | None = None,
         size: tuple[int, int] = (320, 180),
     ) -> list[Any]:
         """Compare pictures, times and memory of pipelines; `settings` has a list for each. The reference is first."""
+        from rendergraph.cli.compare import comparison_text
+        from rendergraph.compare import compare
+        from rendergraph.compare.report.html import eight_bit
+        from rendergraph.images import Shown
 
-        def work() -> list[Any]:
-            from rendergraph.cli.compare import comparison_text
-            from rendergraph.compare import compare
-            from rendergraph.compare.report.html import eight_bit
-            from rendergraph.images import Shown
+        each = settings or [[] for _ in pipelines]
+        if len(each) != len(pipelines):
+            raise UsageError(Problem("RG500", f"expected settings for {len(pipelines)} pipelines, got {len(each)}"))
+        given = [_pipeline(root, name, own, size) for name, own in zip(pipelines, each, strict=True)]
+        against = None if reference is None else _pipeline(root, reference, (), size)
+        found = compare(given, against, frames=3)
+        pictures = [eight_bit(each.pixels, each.encoding) for each in found if each.pixels is not None]
+        return [comparison_text(found), *(Image(data=Shown("", one).png, format="png") for one in pictures[:6])]
 
-            each = settings or [[] for _ in pipelines]
-            if len(each) != len(pipelines):
-                raise UsageError(Problem("RG500", f"expected settings for {len(pipelines)} pipelines, got {len(each)}"))
-            given = [_pipeline(root, name, own, size) for name, own in zip(pipelines, each, strict=True)]
-            against = None if reference is None else _pipeline(root, reference, (), size)
-            found = compare(given, against, frames=3)
-            pictures = [eight_bit(each.pixels, each.encoding) for each in found if each.pixels is not None]
-            data = [Shown("", pixels).png for pixels in pictures[:6]]
-            return [comparison_text(found), *(Image(data=one, format="png") for one in data)]
-
-        return await drawn(work)
+    def write_file(path: str, text: str) -> str:
+        """Write a pipeline, a scene or a shader (.yaml, .frag, .comp, .glsl) into the folder."""
+        target = _check(root, path)
+        if target.suffix not in (".yaml", ".frag", ".comp", ".glsl"):
+            raise UsageError(Problem("RG501", "expected a file that ends in .yaml, .frag, .comp or .glsl"))
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(text, encoding="utf-8")
+        return f"written to {target.relative_to(root)}"
 
     if write:
-
-        @tool
-        async def write_file(path: str, text: str) -> str:
-            """Write a pipeline, a scene or a shader (.yaml, .frag, .comp, .glsl) into the folder."""
-
-            def work() -> str:
-                target = _target(root, path, write=True)
-                if target is None or target.suffix not in (".yaml", ".frag", ".comp", ".glsl"):
-                    raise UsageError(Problem("RG501", "expected a file that ends in .yaml, .frag, .comp or .glsl"))
-                target.parent.mkdir(parents=True, exist_ok=True)
-                target.write_text(text, encoding="utf-8")
-                return f"written to {target.relative_to(root)}"
-
-            return await drawn(work)
-
+        tool(write_file)
     return made
 
 

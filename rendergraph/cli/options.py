@@ -182,12 +182,12 @@ _PATH = NamedPath()
 
 
 def offered(kind: str) -> Callable[[click.Context, click.Parameter, str], list[Any]]:
-    """Return a completion callback, which imports a function of `rendergraph.cli.completion` when a shell asks."""
+    """Return a completion callback for a kind of words; what finds them is imported when a shell asks."""
 
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
-        completion = importlib.import_module("rendergraph.cli.completion")
-        found: list[Any] = getattr(completion, kind)(ctx, param, incomplete)
-        return found
+        from rendergraph.cli import completion  # see above
+
+        return completion.complete(kind, ctx, incomplete)
 
     return complete
 

@@ -76,10 +76,7 @@ def _group(text: str) -> tuple[str, ...]:
     "--budget", type=click.IntRange(1, 10_000), metavar="N", help="Maximum number of runs of --minimise.  [default: 50]"
 )
 @click.option("--csv", "as_csv", is_flag=True, help="Also write results.csv, with a row for each run.")
-@shared.reference_option
-@shared.truth_options
-@shared.metric_option
-@options.selection_options
+@shared.measure_options
 @click.option("-n", "--frames", type=click.IntRange(1, 10_000), help="Measured frames.  [default: 5]")
 @click.option(
     "--repeats", type=click.IntRange(1, 1000), metavar="N", help="Measure N times, and report the spread.  [default: 1]"
@@ -119,14 +116,15 @@ def sweep(
     """
     from rendergraph.compare import SweepOptions, search, sweep
     from rendergraph.compare.store import kept_runs
+    from rendergraph.compare.sweepfile import is_sweep, read_sweep
     from rendergraph.session import Pipeline
 
-    file = _file(pipeline)
+    file = read_sweep(Path(pipeline)) if is_sweep(Path(pipeline)) else None
     space = _space(file, axes, **{name: settings.pop(name) for name in ("zipped", "samples", "sampling", "seed")})
     given = {name: value for name, value in settings.items() if value not in (None, ())}
     if file is not None:
         given = {**file.options, **given}
-        reference, pipeline, select = reference or file.reference, file.pipeline, with_file(file, select)
+        reference, pipeline, select = reference or file.reference, file.pipeline, _with_file(file, select)
     how = SweepOptions(
         **given, seed=space.seed, progress=on_terminal() and not as_json, events=say_event if as_json else None
     )
@@ -142,7 +140,7 @@ def sweep(
         from rendergraph.compare.prepare import prepare
         from rendergraph.compare.runner import list_sweep
 
-        with at_its_lines(file):
+        with _at_its_lines(file):
             prepared = prepare(base, space, out or Path(), against, how)
             runs = list_sweep(prepared, out, how)
         emit_json(runs.as_json()) if as_json else _show(runs)
@@ -153,7 +151,7 @@ def sweep(
         text = f"-o takes a folder for report.html and, with --csv, results.csv, not a file: -o {out.with_suffix('')}"
         raise UsageError(Problem("RG500", text))
     try:
-        with at_its_lines(file):
+        with _at_its_lines(file):
             outcome = (search if how.minimise else sweep)(base, space, out, against, how)
     except KeyboardInterrupt:
         kept = kept_runs(out)
@@ -200,14 +198,8 @@ def _write_files(outcome: Sweep, out: Path, *, title: str, note: str, as_csv: bo
     return files
 
 
-def _file(name: str) -> SweepFile | None:
-    from rendergraph.compare.sweepfile import is_sweep, read_sweep
-
-    return read_sweep(Path(name)) if is_sweep(Path(name)) else None
-
-
 @contextmanager
-def at_its_lines(file: SweepFile | None) -> Iterator[None]:
+def _at_its_lines(file: SweepFile | None) -> Iterator[None]:
     """Relocate mistakes in the paths of a sweep's file to its lines."""
     try:
         yield
@@ -236,11 +228,11 @@ def check_file(path: Path, select: options.Select) -> tuple[int, tuple[Problem, 
     from rendergraph.session import Pipeline
 
     file = read_sweep(path)
-    select = with_file(file, select)
-    with at_its_lines(file):
+    select = _with_file(file, select)
+    how = SweepOptions(**file.options)
+    with _at_its_lines(file):
         against = shared.load_reference(file.reference, select)
         base = Pipeline(select(file.pipeline))
-        how = SweepOptions(**file.options)
         if how.minimise:
             prepared = check_search(base, file.space, against, how.minimise, how.metric)
         else:
@@ -249,7 +241,7 @@ def check_file(path: Path, select: options.Select) -> tuple[int, tuple[Problem, 
     return how.budget if how.minimise else len(prepared.runs), tuple(warnings)
 
 
-def with_file(file: SweepFile, select: options.Select) -> options.Select:
+def _with_file(file: SweepFile, select: options.Select) -> options.Select:
     """Return the options, completed by those of a sweep's file."""
 
     def selected(name: str) -> Selection:
@@ -356,8 +348,8 @@ def farm(
     from rendergraph.session import Pipeline, Selection
 
     file = read_sweep(sweep)
-    with at_its_lines(file):
-        select = with_file(file, Selection)
+    with _at_its_lines(file):
+        select = _with_file(file, Selection)
         base, reference = Pipeline(select(file.pipeline)), shared.load_reference(file.reference, select)
         how = SweepOptions(**{**file.options, "kept": "all"}, device=device)
         if action == "export":
@@ -370,12 +362,11 @@ def farm(
             raise UsageError(Problem("RG500", f"farm {action} needs --runs, such as --runs 1-16"))
         if (most := max(runs)) > (count := len(file.space.runs())):
             raise UsageError(Problem("RG500", f"--runs: there is no run {most}; the sweep has {amount(count, 'run')}"))
-        only = sorted(number - 1 for number in runs)
-        how = how.replace(only=only)
+        how = how.replace(only=sorted(number - 1 for number in runs))
         if action == "measure":
             from rendergraph.compare.export.shards import measure
 
-            _report(measure(base, file.space, out, reference, how), out, len(only), as_json=as_json)
+            _report(measure(base, file.space, out, reference, how), out, len(runs), as_json=as_json)
         elif frames is None:
             raise UsageError(Problem("RG500", "farm frames needs --frames, such as --frames 1-24"))
         else:
