@@ -78,7 +78,7 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
     made = MCPServer("rendergraph", instructions=_INSTRUCTIONS, version=__version__, log_level="ERROR")
 
     def tool(work: Callable[..., Any]) -> None:
-        """Offer a function as a tool: it runs in the worker; its errors give the assistant the place of each mistake."""
+        """Offer a function as a tool: it runs in the worker; its errors give the assistant every mistake's place."""
 
         @wraps(work)
         async def call(*arguments: Any, **keywords: Any) -> Any:

@@ -12,7 +12,7 @@ from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, TextIO
 
 from rendergraph import formatting
-from rendergraph.errors import Place, Problem
+from rendergraph.errors import Problem
 from rendergraph.formatting import jsonable
 
 if TYPE_CHECKING:
@@ -100,23 +100,15 @@ def _write(text: str) -> None:
         sys.stderr.flush()
 
 
-def warn(problems: Sequence[Problem]) -> None:
-    Warnings().say(problems)
-
-
-class Warnings:
-    """Prints each warning once; of several values of one setting, the first."""
-
-    def __init__(self) -> None:
-        self._printed: set[tuple[str, str, str | Place | None]] = set()
-
-    def say(self, problems: Sequence[Problem]) -> None:
-        for problem in problems:
-            setting = problem.place.option("--set") if problem.place else None
-            key = problem.code, problem.message, setting.path if setting else problem.place
-            if key not in self._printed:
-                self._printed.add(key)
-                print_problem(problem)
+def warn(problems: Sequence[Problem], printed: set[object] | None = None) -> None:
+    """Print each warning once, of several values of one setting the first; calls may share what is `printed`."""
+    printed = set() if printed is None else printed
+    for problem in problems:
+        setting = problem.place.option("--set") if problem.place else None
+        key = problem.code, problem.message, setting.path if setting else problem.place
+        if key not in printed:
+            printed.add(key)
+            print_problem(problem)
 
 
 def say_summary(report: dict[str, Any]) -> None:

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from rendergraph.cli import options
 from rendergraph.cli.lazy_click import click
 from rendergraph.cli.options import Target
-from rendergraph.cli.output import Warnings, emit, emit_json, progress_bar, say_event, say_summary
+from rendergraph.cli.output import emit, emit_json, progress_bar, say_event, say_summary, warn
 from rendergraph.errors import InputError, Place, Problem, UsageError
 from rendergraph.stamps import track_reads
 
@@ -68,12 +68,7 @@ if TYPE_CHECKING:
     help="Skip steps whose results are unchanged since the previous frame.  [default: unless --json, which times them]",
 )
 @click.option(
-    "--no-cull",
-    "cull",
-    is_flag=True,
-    flag_value=False,
-    default=True,
-    help="Draw objects outside the view frustum too.",
+    "--no-cull", "cull", is_flag=True, flag_value=False, default=True, help="Draw objects outside the view frustum too."
 )
 @options.alias_option
 @options.heap_option
@@ -130,9 +125,9 @@ def run(
         moments, circle = subframes or linked.subframes, number if turntable else None
         return RenderOptions(number, rate, timed=as_json, subframes=moments, turntable=circle, **modes)
 
-    warnings = Warnings()
-    read = partial(_read, selection, render_options, outputs, taps, tap_all, warnings, resume=resume)
-    draw = partial(_draw, sheet=tap_all, warnings=warnings, quiet=as_json)
+    warned: set[object] = set()
+    read = partial(_read, selection, render_options, outputs, taps, tap_all, warned, resume=resume)
+    draw = partial(_draw, sheet=tap_all, warned=warned, quiet=as_json)
     if watch:
         if executor is not None:
             raise UsageError(Problem("RG500", "--watch renders in this process; leave out --executor"))
@@ -154,7 +149,7 @@ def run(
         modules = {type(node.node).__module__ for node in expanded.linked.graph.nodes}
         with make_executor(executor, None, device, tasks=2, devices=devices, timeout=timeout) as farm:
             farm.upload_inputs(lambda: make_bundle(files, selection.plugins, modules))
-            report = draw_in_parts(expanded, targets, farm, warnings=warnings, quiet=as_json)
+            report = draw_in_parts(expanded, targets, farm, warned=warned, quiet=as_json)
     say_summary(report)
     if as_json:
         emit_json(report)
@@ -166,7 +161,7 @@ def _read(
     outputs: tuple[Target, ...],
     taps: tuple[Target, ...],
     tap_all: Path | None,
-    warnings: Warnings,
+    warned: set[object],
     *,
     resume: bool,
 ) -> tuple[Expanded, list[Target]]:
@@ -180,7 +175,7 @@ def _read(
 
     with track_reads() as files:
         linked = stages.link(stages.resolve(selection))
-    warnings.say(linked.warnings)
+    warn(linked.warnings, warned)
     modes = modes_of(linked)
     ending = ".####.png" if len(modes.frames) > 1 else ".png"
     if not outputs and not taps and tap_all is None:
@@ -191,23 +186,19 @@ def _read(
             Target(port, tap_all / f"{number:02d}-{port.replace('/', '-')}{ending}", is_tap=True, on_sheet=True)
             for number, port in enumerate(ports, start=1)
         )
-    known = linked.graph.outputs
-    pictures = [
-        t.path.with_suffix(".png") if is_film(t.path) else t.path for t in outputs
-    ]  # a film consists of pictures
-    for path in pictures:
-        extension(path, ENDINGS)
-    named = [
-        t if t.name else replace(t, name=images.output_for(path, known))
-        for t, path in zip(outputs, pictures, strict=True)
-    ]
-    wanted = tuple(dict.fromkeys((*_names(named), *figures(linked.graph))))
-    expanded = stages.expand(linked, replace(modes, outputs=wanted, taps=_names(taps)))
+    named = []
+    for target in outputs:
+        picture = target.path.with_suffix(".png") if is_film(target.path) else target.path  # films consist of pictures
+        extension(picture, ENDINGS)
+        named.append(replace(target, name=target.name or images.output_for(picture, linked.graph.outputs)))
+    wanted = dict.fromkeys((*(target.name for target in named), *figures(linked.graph)))
+    tapped = dict.fromkeys(target.name for target in taps)
+    expanded = stages.expand(linked, replace(modes, outputs=tuple(wanted), taps=tuple(tapped)))
     targets = [*named, *taps]
     if tap_all is not None:
         _make_folder(tap_all)
     _check(targets, expanded, map(Path, files))
-    warnings.say(standstill_warning(expanded, film=any(is_film(target.path) for target in targets)))
+    warn(standstill_warning(expanded, film=any(is_film(target.path) for target in targets)), warned)
     return (_resumed(expanded, targets) if resume else expanded), targets
 
 
@@ -259,12 +250,8 @@ def _make_folder(folder: Path) -> None:
         raise InputError(Problem("RG504", text, Place(str(folder)))) from error
 
 
-def _names(targets: Iterable[Target]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(target.name for target in targets))
-
-
 def _draw(
-    expanded: Expanded, targets: Sequence[Target], gpu: Gpu, *, sheet: Path | None, warnings: Warnings, quiet: bool
+    expanded: Expanded, targets: Sequence[Target], gpu: Gpu, *, sheet: Path | None, warned: set[object], quiet: bool
 ) -> dict[str, Any]:
     """Render and write everything, print the paths unless `quiet`, and return the document of `--json`."""
     from rendergraph import images
@@ -272,6 +259,12 @@ def _draw(
     from rendergraph.session import stages
 
     written: list[str] = []
+
+    def show(path: Path) -> None:
+        written.append(str(path))
+        if not quiet:
+            emit(str(path))
+
     contact = "contact.####.png" if len(expanded.options.frames) > 1 else "contact.png"
     pictures = [target for target in targets if not is_film(target.path)]
     moving = [target for target in targets if is_film(target.path)]
@@ -281,9 +274,7 @@ def _draw(
     with films([target.path for target in moving], expanded.options.fps, expanded.options.frames[0]) as open_films:
         for done, frame in enumerate(stages.draw(expanded, gpu), start=1):
             files = [
-                images.Saved(
-                    images.numbered(t.path, frame.number), frame.arrays[t.name], frame.info(t.name), raw=t.is_tap
-                )
+                images.Saved(images.numbered(t.path, frame.number), frame.arrays[t.name], frame.info(t.name), t.is_tap)
                 for t in pictures
             ]
             if sheet is not None:
@@ -295,19 +286,15 @@ def _draw(
                 open_films[target.path].add(frame.number, shown)
             progress.clear()
             for file in files:
-                written.append(str(file.path))
-                if not quiet:
-                    emit(str(file.path))
+                show(file.path)
             progress(done, len(expanded.options.frames))
             suspect = suspect or (frame if frame.unsound else None)
     progress.clear()
     for target in moving:
-        written.append(str(target.path))
-        if not quiet:
-            emit(str(target.path))
+        show(target.path)
     assert frame is not None  # a range of frames is never empty
     broken = stages.not_finite_warnings(suspect, expanded, gpu) if suspect else ()
-    warnings.say([*frame.warnings, *(broken or stages.exposure_warnings(frame, expanded.linked))])
+    warn([*frame.warnings, *(broken or stages.exposure_warnings(frame, expanded.linked))], warned)
     return frame.as_json() | {"outputs": written}
 
 
@@ -364,7 +351,7 @@ def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path])
 
 
 def draw_in_parts(
-    expanded: Expanded, targets: Sequence[Target], farm: Executor, *, warnings: Warnings, quiet: bool
+    expanded: Expanded, targets: Sequence[Target], farm: Executor, *, warned: set[object], quiet: bool
 ) -> dict[str, Any]:
     """Render and write everything, and return the document of `--json`. Paths are printed unless `quiet`."""
     import dataclasses  # not needed by --help
@@ -400,10 +387,9 @@ def draw_in_parts(
                 say_event({"event": "frame", "frame": item.number, "done": len(written), "of": len(frames)})
     progress.clear()
     lasts.sort(key=lambda frame: frame.number)
-    warnings.say([problem for frame in lasts for problem in frame.warnings])
+    warn([problem for frame in lasts for problem in frame.warnings], warned)
     whole = dataclasses.replace(lasts[-1], times=tuple(times for frame in lasts for times in frame.times))
-    for path in open_films:
-        if not quiet:
-            emit(str(path))
+    for path in open_films if not quiet else ():
+        emit(str(path))
     outputs = [path for number in sorted(written) for path in written[number]]
     return whole.as_json() | {"outputs": [*outputs, *map(str, open_films)]}

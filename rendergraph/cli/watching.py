@@ -11,7 +11,6 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -61,12 +60,17 @@ def turns(draw: Draw, gpu: Gpu) -> Iterator[Turn]:
     seen: tuple[Path, ...] = ()
     while True:
         start, before = time.perf_counter(), _creation_counts(gpu)
-        value, error = None, None
+        value: dict[str, Any] | None = None
+        error: RendergraphError | None = None
         with track_reads() as files:
             try:
                 value = draw(gpu)
             except RendergraphError as problem:
                 error = problem
+            except Exception as problem:  # an internal error is reported like any other, and the next edit is tried
+                if isinstance(problem, OSError) or os.environ.get("RENDERGRAPH_TRACEBACK"):
+                    raise
+                error = RenderError(unexpected(problem))
         created = {name: count - before[name] for name, count in _creation_counts(gpu).items()}
         yield Turn(value, error, seen, (time.perf_counter() - start) * 1e3, created, files)
         seen = tuple(wait(files))
@@ -108,17 +112,14 @@ def watch_and_render(draw: Draw, device: int | None, *, as_json: bool) -> None:
 
     reported: tuple[str, ...] = ()
     with Gpu(device) as gpu:
-        for number, turn in enumerate(turns(partial(_attempt, draw), gpu)):
+        for number, turn in enumerate(turns(draw, gpu)):
             if turn.error is not None:
                 if number == 0 and not _is_fixable(turn.error, turn):
                     raise turn.error
                 reported = _report_error(turn.error, turn.changed, reported)
-            else:
+            elif turn.value is not None:
                 reported = ()
-                if number == 0:
-                    say_summary(turn.value or {})
-                else:
-                    say(_line(turn))
+                say(_line(turn, turn.value)) if number else say_summary(turn.value)
             if number == 0:
                 count = sum(stamp is not None for stamp in turn.files.values())
                 say(f"watching {count} files; Ctrl-C ends")
@@ -126,18 +127,6 @@ def watch_and_render(draw: Draw, device: int | None, *, as_json: bool) -> None:
                 emit_json(_document(turn), line=True)
             if (stream := data_stream()) is not None:
                 stream.flush()  # the reader of a pipe waits for this picture
-
-
-def _attempt(draw: Draw, gpu: Gpu) -> dict[str, Any]:
-    """Render; internal errors are reported like any other, and the next edit is tried."""
-    try:
-        return draw(gpu)
-    except (RendergraphError, OSError):
-        raise
-    except Exception as error:
-        if os.environ.get("RENDERGRAPH_TRACEBACK"):
-            raise
-        raise RenderError(unexpected(error)) from error
 
 
 def _is_fixable(error: RendergraphError, turn: Turn) -> bool:
@@ -157,11 +146,11 @@ def _report_error(error: RendergraphError, changed: tuple[Path, ...], before: tu
     return now
 
 
-def _line(turn: Turn) -> str:
+def _line(turn: Turn, report: dict[str, Any]) -> str:
     rebuilt = [f"{count} {name if count != 1 else name[:-1]}" for name, count in turn.created.items() if count]
-    frame_ms = (turn.value or {})["frame_ms"]["median"]
     what = f"rebuilt {', '.join(rebuilt)}" if rebuilt else "nothing rebuilt"
-    return f"{_names(turn.changed)}: rendered in {turn.ms:.0f} ms ({frame_ms:.1f} ms per frame), {what}"
+    times = f"{turn.ms:.0f} ms ({report['frame_ms']['median']:.1f} ms per frame)"
+    return f"{_names(turn.changed)}: rendered in {times}, {what}"
 
 
 def _names(paths: tuple[Path, ...]) -> str:
