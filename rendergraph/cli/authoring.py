@@ -18,7 +18,7 @@ _LIMITS = ("import-seconds", "pass-seconds", "memory")
 
 
 @click.command("init")
-@click.argument("folder", default=".", type=options.NamedPath(file_okay=False))
+@click.argument("folder", default=".", type=options.FOLDER)
 @options.json_option
 def init(folder: Path, as_json: bool) -> None:
     """Start a project in the current folder or in a new one.
@@ -38,7 +38,7 @@ def init(folder: Path, as_json: bool) -> None:
 
 
 @click.command("copy", no_args_is_help=True)
-@click.argument("name", shell_complete=options.offered("topics"))
+@click.argument("name", type=options.TOPIC)
 @options.json_option
 def copy(name: str, as_json: bool) -> None:
     """Copy a shipped pipeline, scene or node to edit.
@@ -93,7 +93,7 @@ def print_files(written: NewNode, about: dict[str, str], as_json: bool) -> None:
 
 
 @click.command("check-node", no_args_is_help=True)
-@click.argument("file", type=options.NamedPath())
+@click.argument("file", type=options.PATH)
 @click.option(
     "--scene", metavar="FILE", help="Scene for geometry nodes: a shipped name, a scene file, .obj, .gltf, .glb."
 )

@@ -63,8 +63,7 @@ def _crop(text: str) -> tuple[int, int, int, int]:
 measure_options = options.together(
     click.option(
         "--reference",
-        metavar="FILE|PIPELINE[:PATH=VALUE,…]",
-        shell_complete=options.offered("pipelines"),
+        type=options.Parsed("FILE|PIPELINE[:PATH=VALUE,…]", offers="pipelines"),
         help="Measure against this picture or pipeline; the first by default.",
     ),
     click.option(
@@ -84,8 +83,7 @@ measure_options = options.together(
     ),
     click.option(
         "--metric",
-        metavar="NODE.PORT",
-        shell_complete=options.offered("ports"),
+        type=options.Parsed("NODE.PORT", offers="ports"),
         help="Measure this port's texture instead of the picture.",
     ),
     options.selection_options,
@@ -117,13 +115,12 @@ report_options = options.together(
 
 
 @click.command("compare", no_args_is_help=True)
-@click.argument("pipelines", nargs=-1, required=True, shell_complete=options.offered("pipelines"))
+@click.argument("pipelines", nargs=-1, required=True, type=options.PIPELINE)
 @click.option(
     "--with",
     "withs",
     multiple=True,
-    type=options.Parsed("'PATH=VALUE …'", options.settings),
-    shell_complete=options.offered("settings"),
+    type=options.Parsed("'PATH=VALUE …'", options.settings, "settings"),
     help="Add a variant with one or more settings. A single variant is compared with the unchanged pipeline.",
 )
 @measure_options
@@ -132,8 +129,7 @@ report_options = options.together(
 @click.option(
     "-o",
     "--output",
-    type=options.NamedPath(dir_okay=False),
-    metavar="FILE",
+    type=options.FILE,
     help="Write a report (.html), a figure (.pdf, .svg, .png), or a table (.tex, .csv).",
 )
 @click.option(

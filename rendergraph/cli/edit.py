@@ -34,7 +34,7 @@ _dry_run = click.option("--dry-run", is_flag=True, help="Show the difference, an
 
 
 @click.command("edit", no_args_is_help=True, context_settings={"ignore_unknown_options": True})  # -1 is a value
-@click.argument("file", type=options.NamedPath(dir_okay=False))
+@click.argument("file", type=options.FILE)
 @click.argument("operation", type=click.Choice([*_OPERATIONS]))
 @click.argument("words", nargs=-1)
 @_dry_run
@@ -89,7 +89,7 @@ def edit(
 
 
 @click.command("upgrade", no_args_is_help=True)
-@click.argument("file", type=options.NamedPath(dir_okay=False))
+@click.argument("file", type=options.FILE)
 @_dry_run
 @options.plugin_option
 @options.json_option

@@ -31,14 +31,9 @@ Entry = dict[str, Any]
 
 
 @click.command("explain", no_args_is_help=True)
-@click.argument("topic", shell_complete=options.offered("topics"))
+@click.argument("topic", type=options.TOPIC)
 @click.option("--glsl", is_flag=True, help="Print the node's program: the names in scope, and the final text.")
-@click.option(
-    "--pipeline",
-    metavar="PIPELINE",
-    shell_complete=options.offered("pipelines"),
-    help="Pipeline that contains the node TOPIC; requires --glsl.",
-)
+@click.option("--pipeline", type=options.PIPELINE, help="Pipeline that contains the node TOPIC; requires --glsl.")
 @click.option("--step", type=click.IntRange(min=0), metavar="N", help="Step of the node, numbered as by `plan`.")
 @options.selection_options
 @options.json_option
@@ -80,11 +75,7 @@ def explain(topic: str, glsl: bool, pipeline: str | None, step: int | None, sele
 
 
 def _node(
-    name: str,
-    pipeline: str | None,
-    select: Select,
-    plugins: tuple[Path, ...],
-    unknown: Callable[[Iterable[str]], str],
+    name: str, pipeline: str | None, select: Select, plugins: tuple[Path, ...], unknown: Callable[[Iterable[str]], str]
 ) -> tuple[Linked, str]:
     """Return a pipeline and the id of a node in it: a node of `--pipeline`, or that of a type in its example."""
     if pipeline is not None:
@@ -171,14 +162,9 @@ def _python_text(entry: Entry) -> str:
 @click.argument("what", default="pipeline", metavar="[pipeline|scene|sweep|results|results-csv|FILE|NODE]")
 @click.option("--glsl", is_flag=True, help="Print a shader of NODE as a complete file, for a GLSL checker.")
 @click.option("--shader", metavar="NAME", help="Shader to print, if the node has several; requires --glsl.")
-@click.option(
-    "--pipeline",
-    metavar="PIPELINE",
-    shell_complete=options.offered("pipelines"),
-    help="Pipeline that contains the node NODE; requires --glsl.",
-)
+@click.option("--pipeline", type=options.PIPELINE, help="Pipeline that contains the node NODE; requires --glsl.")
 @options.plugin_option
-@click.option("-o", "--output", type=options.NamedPath(dir_okay=False), metavar="FILE", help="Write a file.")
+@click.option("-o", "--output", type=options.FILE, help="Write a file.")
 @options.json_option
 def schema(
     what: str,

@@ -117,7 +117,7 @@ def plan(selection: Selection, as_json: bool, every_step: bool, **modes: Any) ->
     type=click.Choice(["text", "dot", "mermaid", "svg"]),
     help="Format; by default that of the file's extension, or text.",
 )
-@click.option("-o", "--output", type=options.NamedPath(dir_okay=False), metavar="FILE", help="Write a file.")
+@click.option("-o", "--output", type=options.FILE, help="Write a file.")
 @options.json_option
 def graph(selection: Selection, format_name: str | None, output: Path | None, as_json: bool) -> None:
     """Draw the graph as text, DOT, Mermaid or SVG.
@@ -187,12 +187,10 @@ def _of_picture(path: Path, as_json: bool) -> None:
 
 
 @click.command("diff", no_args_is_help=True)
-@click.argument("a", shell_complete=options.offered("pipelines"))
-@click.argument("b", shell_complete=options.offered("pipelines"))
+@click.argument("a", type=options.PIPELINE)
+@click.argument("b", type=options.PIPELINE)
 @options.selection_options
-@click.option(
-    "--svg", type=options.NamedPath(dir_okay=False), metavar="FILE", help="Draw both graphs, differences in colour."
-)
+@click.option("--svg", type=options.FILE, help="Draw both graphs, differences in colour.")
 @options.json_option
 def diff(a: str, b: str, select: options.Select, svg: Path | None, as_json: bool) -> None:
     """Show the differences between two pipelines.

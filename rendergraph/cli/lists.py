@@ -56,7 +56,7 @@ environments = _verb(
 
 
 @click.command("nodes")
-@click.argument("family", required=False, shell_complete=options.offered("families"))
+@click.argument("family", required=False, type=options.Parsed("FAMILY", offers="families"))
 @options.plugin_option
 @options.json_option
 def nodes(family: str | None, plugins: tuple[Path, ...], as_json: bool) -> None:

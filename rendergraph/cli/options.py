@@ -20,6 +20,8 @@ from rendergraph.errors import InputError
 from rendergraph.system import STDIN
 
 if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
     from rendergraph.catalog import Catalog
     from rendergraph.declare import Extensions
     from rendergraph.session import Pipeline, Selection
@@ -46,12 +48,11 @@ class Target(Struct, frozen=True):
 class Parsed(click.ParamType):  # type: ignore[type-arg]  # generic in new versions of click only
     """A value that a function parses from text; its ValueError becomes the message.
 
-    A function given as `module:function` is imported when there is a value.
+    A function given as `module:function` is imported when there is a value. The shell `offers` words of a kind.
     """
 
-    def __init__(self, name: str, parse: Callable[[str], Any] | str) -> None:
-        self.name = name
-        self._parse = parse
+    def __init__(self, name: str, parse: Callable[[str], Any] | str = str, offers: str = "") -> None:
+        self.name, self._parse, self._offers = name, parse, offers
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if not isinstance(value, str):  # a default, or converted before
@@ -65,17 +66,35 @@ class Parsed(click.ParamType):  # type: ignore[type-arg]  # generic in new versi
         except ValueError as error:
             self.fail(str(error), param, ctx)
 
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        return _complete(self._offers, ctx, incomplete) if self._offers else []
+
 
 class NamedPath(click.Path):
     """A path that is not empty: an empty one would mean the current folder."""
 
-    def __init__(self, *, file_okay: bool = True, dir_okay: bool = True) -> None:
+    def __init__(self, metavar: str = "PATH", offers: str = "", *, file_okay: bool = True, dir_okay: bool = True):
         super().__init__(file_okay=file_okay, dir_okay=dir_okay, path_type=Path)
+        self._metavar, self._offers = metavar, offers
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str | None:
+        return None if isinstance(param, click.Argument) else self._metavar
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if value == "" or "\0" in str(value):
             self.fail(f"'{value}' is not the name of a file" + ("" if self.file_okay else " or folder"), param, ctx)
         return super().convert(value, param, ctx)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        if self._offers:
+            return _complete(self._offers, ctx, incomplete)
+        return super().shell_complete(ctx, param, incomplete)
+
+
+def _complete(kind: str, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+    from rendergraph.cli import completion  # only when a shell asks
+
+    return completion.complete(kind, ctx, incomplete)
 
 
 # --- types of values -------------------------------------------------------------------------------------------------
@@ -168,28 +187,22 @@ def _devices(text: str) -> tuple[int, ...]:
 SIZE = Parsed("WxH", _size)
 FRAMES = Parsed("A-B", _frames)
 FRAMES_OR_CLIP = Parsed("A-B|clip", _frames_or_clip)
-SETTING = Parsed("PATH=VALUE", _setting)
+SETTING = Parsed("PATH=VALUE", _setting, "settings")
 OUTPUT = Parsed("[NAME=]FILE", _output)
-TAP = Parsed("NODE.PORT=FILE", _tap)
+TAP = Parsed("NODE.PORT=FILE", _tap, "taps")
 LIMIT = Parsed("NAME=N", _limit)
 POSITIVE = Parsed("NUMBER", _positive)
+SECONDS = Parsed("SECONDS", _positive)
 EXECUTOR = Parsed("NAME", "rendergraph.farm.executors:check_executor_name")
 DEVICES = Parsed("N,N", _devices)
-_PATH = NamedPath()
+PIPELINE = Parsed("PIPELINE", offers="pipelines")
+TOPIC = Parsed("TOPIC", offers="topics")
+PATH = NamedPath()
+FILE = NamedPath("FILE", dir_okay=False)
+FOLDER = NamedPath("DIR", file_okay=False)
 
 
 # --- options ---------------------------------------------------------------------------------------------------------
-
-
-def offered(kind: str) -> Callable[[click.Context, click.Parameter, str], list[Any]]:
-    """Return a completion callback for a kind of words; what finds them is imported when a shell asks."""
-
-    def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
-        from rendergraph.cli import completion  # see above
-
-        return completion.complete(kind, ctx, incomplete)
-
-    return complete
 
 
 def together(*decorators: Callable[[Any], Any]) -> Callable[[F], F]:
@@ -211,16 +224,10 @@ heap_option = click.option(
     "--heap", is_flag=True, help="Let textures of any size and format share memory, where the device supports it."
 )
 plugin_option = click.option(
-    "--plugin", "plugins", multiple=True, type=_PATH, metavar="PATH", help="Node module or a folder of them; runs code."
+    "--plugin", "plugins", multiple=True, type=PATH, help="Node module or a folder of them; runs code."
 )
 
 device_option = click.option("--device", metavar="NUMBER", type=int, help="GL device number, as listed by `doctor`.")
-scene_option = click.option(
-    "--scene",
-    metavar="FILE",
-    shell_complete=offered("scenes"),
-    help="Scene to render: a shipped name, a scene file, .obj, .gltf, .glb.",
-)
 
 
 def _limit_draws(ctx: click.Context, param: click.Parameter, value: float | None) -> None:
@@ -231,8 +238,7 @@ def _limit_draws(ctx: click.Context, param: click.Parameter, value: float | None
 
 draw_timeout_option = click.option(
     "--draw-timeout",
-    type=POSITIVE,
-    metavar="SECONDS",
+    type=SECONDS,
     expose_value=False,
     callback=_limit_draws,
     help="Exit with code 1 and name the step if rendering a frame takes longer.",
@@ -241,25 +247,24 @@ executor_options = together(
     click.option(
         "--executor",
         type=EXECUTOR,
-        metavar="NAME",
         help="Where to render: serial, processes[:N], dask[:N], dask://HOST:PORT.  [default: depends on the machine]",
     ),
-    click.option("--devices", type=DEVICES, default="", metavar="N,N", help="GL devices to distribute over workers."),
+    click.option("--devices", type=DEVICES, default="", help="GL devices to distribute over workers."),
     click.option(
-        "--timeout",
-        type=POSITIVE,
-        metavar="SECONDS",
-        help="Seconds without progress before a worker is replaced.  [default: 600]",
+        "--timeout", type=SECONDS, help="Seconds without progress before a worker is replaced.  [default: 600]"
     ),
     draw_timeout_option,
 )
 """The verb gets `executor`, `devices` and `timeout`."""
 SELECTION_OPTIONS = {
-    "scene": scene_option,
+    "scene": click.option(
+        "--scene",
+        type=Parsed("FILE", offers="scenes"),
+        help="Scene to render: a shipped name, a scene file, .obj, .gltf, .glb.",
+    ),
     "camera": click.option(
         "--camera",
-        metavar="NAME",
-        shell_complete=offered("cameras"),
+        type=Parsed("NAME", offers="cameras"),
         help="Name of one of the scene's cameras, or a new camera: 'eye=0,1,5 target=0,1,0 fov=40'.",
     ),
     "view": click.option(
@@ -272,9 +277,7 @@ SELECTION_OPTIONS = {
     ),
     "environment": click.option(
         "--environment",
-        type=_PATH,
-        metavar="FILE",
-        shell_complete=offered("environments"),
+        type=NamedPath("FILE", "environments"),
         help="Environment map: a shipped name, .hdr or .exr, or `none` to use only the file's own lights.",
     ),
     "variant": click.option(
@@ -295,16 +298,15 @@ SELECTION_OPTIONS = {
         "sets",
         multiple=True,
         type=SETTING,
-        shell_complete=offered("settings"),
         help="Set a parameter, connect an input, change a type, or disable a node: ao.radius=0.5, light.lookup=null, "
         "sun.type=T, ao.enabled=false, scene.lights.sun.intensity=2.",
     ),
-    "patches": click.option("-p", "--patch", "patches", multiple=True, type=_PATH, help="Apply a merge patch file."),
+    "patches": click.option("-p", "--patch", "patches", multiple=True, type=PATH, help="Apply a merge patch file."),
     "asset_roots": click.option(
         "--asset-root",
         "asset_roots",
         multiple=True,
-        type=_PATH,
+        type=PATH,
         metavar="DIR",
         help="Another folder from which files may be read.",
     ),
@@ -323,7 +325,7 @@ def pipeline_options(function: F) -> F:
     def selected(*, pipeline: str, select: Select, **given: Any) -> None:
         function(selection=select(pipeline), **given)
 
-    return click.argument("pipeline", shell_complete=offered("pipelines"))(selection_options(selected))  # type: ignore[return-value]
+    return click.argument("pipeline", type=PIPELINE)(selection_options(selected))  # type: ignore[return-value]
 
 
 def selection_options(function: F) -> F:

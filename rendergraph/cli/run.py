@@ -44,14 +44,7 @@ if TYPE_CHECKING:
     help="Render each frame at N moments while the shutter is open, and average their light.",
 )
 @click.option("-o", "--output", "outputs", multiple=True, type=options.OUTPUT, help="Write an output to a file.")
-@click.option(
-    "--tap",
-    "taps",
-    multiple=True,
-    type=options.TAP,
-    shell_complete=options.offered("taps"),
-    help="Write any port's texture to a file.",
-)
+@click.option("--tap", "taps", multiple=True, type=options.TAP, help="Write any port's texture to a file.")
 @click.option(
     "--tap-all",
     type=options.NamedPath(file_okay=False),

@@ -31,14 +31,13 @@ def _group(text: str) -> tuple[str, ...]:
 
 
 @click.command("sweep", no_args_is_help=True)
-@click.argument("pipeline", shell_complete=options.offered("pipelines"))
+@click.argument("pipeline", type=options.PIPELINE)
 @click.option(
     "-x",
     "--axis",
     "axes",
     multiple=True,
-    type=options.Parsed("PATH=V,V,…", "rendergraph.compare.space:parse_axis"),
-    shell_complete=options.offered("settings"),
+    type=options.Parsed("PATH=V,V,…", "rendergraph.compare.space:parse_axis", "settings"),
     help="Values of a path that -s takes: 8,16, 8:64:8 or log:0.1:10:5; with --samples 0.1:2.",
 )
 @click.option(
@@ -54,12 +53,7 @@ def _group(text: str) -> tuple[str, ...]:
 )
 @click.option("--seed", type=click.IntRange(0), metavar="N", help="Random seed.  [default: 0]")
 @click.option(
-    "-o",
-    "--output",
-    "out",
-    type=options.NamedPath(file_okay=False),
-    metavar="DIR",
-    help="A folder for the runs, results.jsonl and report.html.",
+    "-o", "--output", "out", type=options.FOLDER, help="A folder for the runs, results.jsonl and report.html."
 )
 @click.option("--resume", is_flag=True, help="Keep the runs that DIR already has.")
 @click.option("--list", "listing", is_flag=True, help="List the runs and the passes they share; render nothing.")
@@ -299,7 +293,7 @@ def _show(outcome: Listing) -> None:
 
 @click.command("farm", no_args_is_help=True)
 @click.argument("action", type=click.Choice(["export", "measure", "frames"]))
-@click.argument("sweep", type=options.NamedPath(dir_okay=False))
+@click.argument("sweep", type=options.FILE)
 @click.option("--openjd", is_flag=True, help="Export an Open Job Description template, the only kind of job.")
 @click.option(
     "--runs",
@@ -308,15 +302,7 @@ def _show(outcome: Listing) -> None:
 )
 @click.option("--frames", type=options.FRAMES, help="Render these frames of each run, too.")
 @click.option("--chunk", type=click.IntRange(1, 100_000), default=24, show_default=True, help="Frames per task.")
-@click.option(
-    "-o",
-    "--output",
-    "out",
-    type=options.NamedPath(),
-    metavar="PATH",
-    required=True,
-    help="The template, or a folder of runs.",
-)
+@click.option("-o", "--output", "out", type=options.PATH, required=True, help="The template, or a folder of runs.")
 @options.json_option
 @options.device_option
 def farm(

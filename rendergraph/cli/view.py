@@ -121,7 +121,7 @@ def _open(url: str) -> None:
 
 
 @click.command("gallery", no_args_is_help=True)
-@click.argument("pipelines", nargs=-1, required=True, shell_complete=options.offered("pipelines"))
+@click.argument("pipelines", nargs=-1, required=True, type=options.PIPELINE)
 @options.selection_options
 @click.option(
     "-o",
