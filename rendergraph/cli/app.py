@@ -55,12 +55,13 @@ def verb(name: str) -> click.Command:
     return found
 
 
-def _set_quiet(ctx: click.Context, param: click.Parameter, value: bool) -> None:
-    set_quiet(value)
-
-
 _QUIET = click.Option(
-    ["-q", "--quiet"], is_flag=True, is_eager=True, expose_value=False, callback=_set_quiet, help="Print only errors."
+    ["-q", "--quiet"],
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=lambda ctx, param, value: set_quiet(value),
+    help="Print only errors.",
 )
 """An option of every verb."""
 
@@ -85,17 +86,13 @@ class _Verbs(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if args[0] not in VERBS and not args[0].startswith("-"):
             from rendergraph.cli.suggestions import meant_by  # only needed for a misspelt verb
+            from rendergraph.resources import shipped_pipelines  # likewise
 
-            meant = meant_by(args[0].lower(), "verbs") or (f"run {args[0]}" if _is_pipeline(args[0]) else None)
+            is_pipeline = args[0] in shipped_pipelines() or args[0].endswith((".yaml", ".yml"))
+            meant = meant_by(args[0].lower(), "verbs") or (f"run {args[0]}" if is_pipeline else None)
             hint = f"; did you mean '{meant}'?" if meant else suggestion(args[0], VERBS)
             ctx.fail(f"unknown verb '{args[0]}'{hint}")
         return super().resolve_command(ctx, args)
-
-
-def _is_pipeline(word: str) -> bool:
-    from rendergraph.resources import shipped_pipelines  # see above
-
-    return word in shipped_pipelines() or word.endswith((".yaml", ".yml"))
 
 
 _EPILOG = "\b\nExit codes:\n" + "\n".join(f"  {code:<4} {meaning}" for code, meaning in EXIT_CODES.items())

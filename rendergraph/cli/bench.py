@@ -10,7 +10,7 @@ from rendergraph.cli.output import emit, emit_json, say, table, warn
 from rendergraph.formatting import format_bytes
 
 if TYPE_CHECKING:
-    from rendergraph.session import Frame, Selection
+    from rendergraph.session import Selection
 
 
 @click.command("bench", no_args_is_help=True)
@@ -35,6 +35,9 @@ def bench(selection: Selection, frames: int, steps: bool, as_json: bool, device:
       rendergraph bench forward --frames 5 --size 320x180 --json
       rendergraph bench bloom --frames 5 --size 320x180 --steps
     """
+    from msgspec import to_builtins
+
+    from rendergraph.compare.timing import step_times, times_of
     from rendergraph.session import RenderOptions, stages
     from rendergraph.session.gpu import Gpu
 
@@ -42,24 +45,14 @@ def bench(selection: Selection, frames: int, steps: bool, as_json: bool, device:
     with Gpu(device) as gpu:
         frame = stages.draw_last(expanded, gpu)
     warn(frame.warnings)
-    report = measured(frame)
+    types = {str(entry["node"]): str(entry["type"]) for entry in frame.passes}
+    times = to_builtins(times_of(frame.times, types))
+    report = frame.as_json() | {name: times[name] for name in ("frames", "frame_ms", "passes")}
     if steps:
-        from rendergraph.compare.timing import step_times
-
         report["steps"] = step_times(frame.times)
     emit_json(report) if as_json else emit(_text(report))
     if report["device"]["software"]:
         say(f"software rendering on {report['device']['renderer']}: these times say nothing about GPUs")
-
-
-def measured(frame: Frame) -> dict[str, Any]:
-    """Return the frame's report with the spread of every figure over all frames."""
-    from msgspec import to_builtins
-
-    from rendergraph.compare.timing import times_of
-
-    times = to_builtins(times_of(frame.times, {str(entry["node"]): str(entry["type"]) for entry in frame.passes}))
-    return frame.as_json() | {name: times[name] for name in ("frames", "frame_ms", "passes")}
 
 
 def _text(report: dict[str, Any]) -> str:
@@ -73,16 +66,11 @@ def _text(report: dict[str, Any]) -> str:
     rows.append(("frame", "", "", "", *_figures(report["frame_ms"])))
     width, height = report["size"]
     device, memory = report["device"], report["memory"]
-    allocated = format_bytes(memory["allocated_bytes"])
-    heads = ("pass", "type", "GPU ms", "10–90 %", "CPU ms", "10–90 %")
-    return "\n".join(
-        [
-            f"{report['pipeline']}, {width}×{height}, {report['frames']} frames on {device['renderer']}"
-            + (" (software)" if device["software"] else ""),
-            table(rows, heads, right=(2, 3, 4, 5)),
-            f"textures: {allocated}, {format_bytes(memory['no_reuse_bytes'])} without reuse",
-        ]
-    )
+    allocated, unshared = (format_bytes(memory[name]) for name in ("allocated_bytes", "no_reuse_bytes"))
+    title = f"{report['pipeline']}, {width}×{height}, {report['frames']} frames on {device['renderer']}"
+    title += " (software)" if device["software"] else ""
+    times = table(rows, ("pass", "type", "GPU ms", "10–90 %", "CPU ms", "10–90 %"), right=(2, 3, 4, 5))
+    return f"{title}\n{times}\ntextures: {allocated}, {unshared} without reuse"
 
 
 def _figures(figures: dict[str, float] | None) -> tuple[str, str]:

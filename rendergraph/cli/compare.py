@@ -226,7 +226,10 @@ def _variants(
     if not withs:
         return [], [_load(name, names, select) for name in names]
     variants = [(), *withs] if len(withs) == 1 else list(withs)
-    pipelines = [_with(settings, select(names[0])) for settings in variants]
+    base, pipelines = select(names[0]), []
+    for settings in variants:
+        pipelines.append(_set_by("--with", settings, replace(base, sets=(*base.sets, *settings))))
+        warn(pipelines[-1].link().warnings)
     return [" ".join(settings) or Path(names[0]).stem for settings in variants], pipelines
 
 
@@ -262,13 +265,6 @@ def _load(name: str, names: Sequence[str], select: options.Select) -> Pipeline:
                 else problem
             )
         ) from None
-
-
-def _with(settings: Sequence[str], selection: Selection) -> Pipeline:
-    """Return the pipeline with the settings of one variant; mistakes in them are located at `--with`."""
-    pipeline = _set_by("--with", settings, replace(selection, sets=(*selection.sets, *settings)))
-    warn(pipeline.link().warnings)
-    return pipeline
 
 
 def _set_by(option: str, settings: Sequence[str], selection: Selection) -> Pipeline:

@@ -118,7 +118,9 @@ def server(root: Path, *, write: bool = False) -> MCPServer:
         output: str | None = None,
     ) -> list[Any]:
         """Render a pipeline and return its picture; `output` writes it to a file, if the server may write."""
-        target = _target(root, output, write=write)
+        if output is not None and not write:
+            raise UsageError(Problem("RG500", "this server writes no files; start it with: rendergraph mcp --write"))
+        target = None if output is None else _check(root, output)
         found = _pipeline(root, pipeline, settings, size).render(frames=range(frame, frame + 1))
         shown = [f"{one['node']} ({one['type']})" for one in found.passes]
         saved = f"; written to {found.save(target)}" if target is not None else ""
@@ -225,11 +227,3 @@ def _check(root: Path, word: str) -> Path:
     if not path.is_relative_to(root.resolve()):
         raise InputError(Problem("RG012", f"'{word}' lies outside the folder of this server, '{root}'"))
     return path
-
-
-def _target(root: Path, output: str | None, *, write: bool) -> Path | None:
-    if output is None:
-        return None
-    if not write:
-        raise UsageError(Problem("RG500", "this server writes no files; start it with: rendergraph mcp --write"))
-    return _check(root, output)

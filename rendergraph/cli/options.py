@@ -107,10 +107,6 @@ def _size(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
-def _frames_or_clip(text: str) -> range | str:
-    return text if text == "clip" else _frames(text)
-
-
 def _frames(text: str) -> range:
     match = re.fullmatch(r"([0-9]{1,9})(?:-([0-9]{1,9}))?", text)
     first, last = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
@@ -186,7 +182,7 @@ def _devices(text: str) -> tuple[int, ...]:
 
 SIZE = Parsed("WxH", _size)
 FRAMES = Parsed("A-B", _frames)
-FRAMES_OR_CLIP = Parsed("A-B|clip", _frames_or_clip)
+FRAMES_OR_CLIP = Parsed("A-B|clip", lambda text: text if text == "clip" else _frames(text))
 SETTING = Parsed("PATH=VALUE", _setting, "settings")
 OUTPUT = Parsed("[NAME=]FILE", _output)
 TAP = Parsed("NODE.PORT=FILE", _tap, "taps")

@@ -102,22 +102,17 @@ def view(
             return
         server = Server(state, process, host=host, port=port)
         emit_json({"url": server.url}) if as_json else emit(server.url)
-        if not no_open:
-            _open(server.url)
+        has_display = sys.platform != "linux" or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+        if has_display and not no_open:
+            import webbrowser
+
+            webbrowser.open(server.url)
         say("serving; Ctrl-C ends")
         try:
             server.run()
         finally:
             if (kept := state.keep()) is not None:
                 say(f"changes that were not saved are in {kept.name}")
-
-
-def _open(url: str) -> None:
-    """Open a browser if there is a display."""
-    import webbrowser  # rarely needed
-
-    if sys.platform != "linux" or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
-        webbrowser.open(url)
 
 
 @click.command("gallery", no_args_is_help=True)

@@ -63,7 +63,7 @@ def rename(text: str, path: Path, key: str) -> str:
     def written(text: str, path: Path, data: Any) -> str:
         span = spans(text, path)[-1]
         adjacent = re.match(r":\S", text[span.key_end :])  # `{"a":1}`: the colon would join an unquoted key
-        return text[: span.key_start] + (f'"{key}"' if adjacent else text_of(key)) + text[span.key_end :]
+        return text[: span.first] + (f'"{key}"' if adjacent else text_of(key)) + text[span.key_end :]
 
     return _checked(text, path, change, written)
 
@@ -91,18 +91,17 @@ def _unshared(data: Any) -> Any:
 
 
 class Span(Struct, eq=False):
-    """Offsets of a value and its key in the text; a `block` is a mapping or list in block style."""
+    """Offsets of a value and its key in the text; a `block` is a mapping or list in block style.
+
+    An entry begins at `first`, with its key, or with its value if that has no key.
+    """
 
     start: int
     end: int
-    block: bool = False
-    key_start: int = -1
-    key_end: int = -1
-    children: dict[Any, Span] | None = None
-
-    @property
-    def first(self) -> int:
-        return self.key_start if self.key_start >= 0 else self.start
+    block: bool
+    first: int
+    key_end: int
+    children: dict[Any, Span] | None
 
     @property
     def last(self) -> int:
@@ -133,10 +132,8 @@ def spans(text: str, path: Path) -> list[Span]:
                     children[name] = span(get(), following)
             closing: Any = following
             end = max(child.last for child in children.values()) if block else closing.end_mark.index
-        found = Span(start, end, block, children=children)
-        if key is not None:
-            found.key_start, found.key_end = key.start_mark.index, key.end_mark.index
-        return found
+        first, key_end = (start, start) if key is None else (key.start_mark.index, key.end_mark.index)
+        return Span(start, end, block, first, key_end, children)
 
     while not isinstance(get(), yaml.DocumentStartEvent):
         pass
@@ -177,7 +174,7 @@ def _set(text: str, path: Path, data: Any) -> str:
 
 
 def _replace(text: str, span: Span, written: str) -> str:
-    colon = text.find(":", span.key_end, span.start) if span.key_start >= 0 else -1
+    colon = text.find(":", span.key_end, span.start)
     if span.start == span.end:  # the value is empty
         at = colon + 1 or span.end
         return text[:at] + (" " if colon >= 0 else ": ") + written + text[at:]
