@@ -75,32 +75,19 @@ class OutputChange(Struct, frozen=True):
 
 
 class GraphDiff(Struct, frozen=True):
-    """The changes that turn one graph into another.
+    """The changes that turn one graph into another."""
 
-    Attributes:
-        names: of the two pipelines.
-        nodes: the first graph's nodes to the second's, where they match.
-        added, removed: nodes that only the second, only the first graph has.
-        disabled: nodes among these that the other graph disables with `enabled: false`.
-        renamed: old id to new id, if only the id differs.
-        retyped: nodes of another type under the same id.
-        parameters: values that differ; a parameter that only one of two types has counts only if it is set.
-        links: inputs that read another port, except those of added and removed nodes.
-        outputs: those that show another port.
-        sizes: both sizes if they differ.
-    """
-
-    names: tuple[str, str]
-    nodes: Mapping[str, str]
-    added: tuple[str, ...] = ()
-    removed: tuple[str, ...] = ()
-    disabled: tuple[str, ...] = ()
-    renamed: Mapping[str, str] = {}
-    retyped: tuple[Retyped, ...] = ()
-    parameters: tuple[ParameterChange, ...] = ()
-    links: tuple[LinkChange, ...] = ()
-    outputs: tuple[OutputChange, ...] = ()
-    sizes: tuple[tuple[int, int], tuple[int, int]] | None = None
+    names: tuple[str, str]  # of the two pipelines
+    nodes: Mapping[str, str]  # the first graph's nodes to the second's, where they match
+    added: tuple[str, ...] = ()  # nodes that only the second graph has
+    removed: tuple[str, ...] = ()  # nodes that only the first graph has
+    disabled: tuple[str, ...] = ()  # nodes among these that the other graph disables with `enabled: false`
+    renamed: Mapping[str, str] = {}  # old id to new id, if only the id differs
+    retyped: tuple[Retyped, ...] = ()  # nodes of another type under the same id
+    parameters: tuple[ParameterChange, ...] = ()  # one that only one of two types has counts only if it is set
+    links: tuple[LinkChange, ...] = ()  # inputs that read another port, except those of added and removed nodes
+    outputs: tuple[OutputChange, ...] = ()  # those that show another port
+    sizes: tuple[tuple[int, int], tuple[int, int]] | None = None  # both if they differ
 
     def __str__(self) -> str:
         return diff_text(self).rstrip("\n")

@@ -47,7 +47,7 @@ def bench(selection: Selection, frames: int, steps: bool, as_json: bool, device:
     warn(frame.warnings)
     types = {str(entry["node"]): str(entry["type"]) for entry in frame.passes}
     times = to_builtins(times_of(frame.times, types))
-    report = frame.as_json() | {name: times[name] for name in ("frames", "frame_ms", "passes")}
+    report: dict[str, Any] = frame.as_json() | {name: times[name] for name in ("frames", "frame_ms", "passes")}
     if steps:
         report["steps"] = step_times(frame.times)
     emit_json(report) if as_json else emit(_text(report))

@@ -248,23 +248,20 @@ def _are_pictures(names: Sequence[str], reference: str | None, select: options.S
 
 def _load(name: str, names: Sequence[str], select: options.Select) -> Pipeline:
     """Return one of the pipelines; where an -s fits only another one, the message says how to apply it there."""
+    other = next((other for other in names if other != name), None)
+
+    def explained(problem: Problem) -> Problem:
+        if problem.code == "RG510":
+            return problem.relocate(problem.place, hint=f"; to measure pipelines against it: --reference {name}")
+        if other is None or problem.place is None or not problem.place.option("--set"):
+            return problem
+        way = f"; -s applies to all pipelines; for one alone: rendergraph compare {other} --reference {name} -s …"
+        return problem.relocate(problem.place, context=f"in {name}", hint=way)
+
     try:
         return options.linked(select(name))
     except InputError as error:
-        if error.problems[0].code == "RG510":
-            way = f"; to measure pipelines against it: --reference {name}"
-            raise error.relocated(lambda problem: problem.relocate(problem.place, hint=way)) from None
-        others = [other for other in names if other != name]
-        if not others:
-            raise
-        way = f"; -s applies to all pipelines; for one alone: rendergraph compare {others[0]} --reference {name} -s …"
-        raise error.relocated(
-            lambda problem: (
-                problem.relocate(problem.place, context=f"in {name}", hint=way)
-                if problem.place and problem.place.option("--set")
-                else problem
-            )
-        ) from None
+        raise error.relocated(explained) from None
 
 
 def _set_by(option: str, settings: Sequence[str], selection: Selection) -> Pipeline:

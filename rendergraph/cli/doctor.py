@@ -1,7 +1,12 @@
-"""`rendergraph doctor`: check whether this machine can render, and what is missing."""
+"""`rendergraph doctor`: check whether this machine can render, and what is missing.
+
+A broken driver may crash its process. So child processes, which run this module, examine GL and answer with JSON on
+stdout: without an argument they list the EGL devices, with a number they open that device.
+"""
 
 from __future__ import annotations
 
+import ctypes
 import json
 import platform
 import re
@@ -12,10 +17,12 @@ from rendergraph import system
 from rendergraph.cli import options
 from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import emit, emit_json, table
+from rendergraph.errors import RendergraphError
 from rendergraph.installed import version, versions
 
 _OPTIONAL_FEATURES = ("memory objects", "depth bounds")
 _SECONDS = 60
+_STORED_BLOCKS = "a crash of this driver is avoided: more than two uniform blocks a stage are storage blocks"
 NO_DEVICE = 5
 
 
@@ -61,10 +68,10 @@ def examine() -> dict[str, Any]:
 
 
 def _probe(*arguments: str) -> dict[str, Any]:
-    """Run `probe` in a child process and return its answer, or the `problem`."""
+    """Examine GL in a child process and return its answer, or the `problem`."""
     import subprocess
 
-    command_line = [sys.executable, "-m", "rendergraph.cli.probe", *arguments]
+    command_line = [sys.executable, "-m", "rendergraph.cli.doctor", *arguments]
     try:
         done = subprocess.run(
             command_line, capture_output=True, text=True, errors="replace", timeout=_SECONDS, check=False
@@ -138,3 +145,61 @@ def _text(report: dict[str, Any]) -> str:
     lines.append("ready to render" if report["ok"] else "cannot render here yet")
     lines += [f"  {line}" for line in report["install"]]
     return "\n".join(lines)
+
+
+# --- in the child process ---------------------------------------------------------------------------------------------
+
+
+def _libraries() -> dict[str, str | None]:
+    found: dict[str, str | None] = {}
+    for name in (system.EGL, system.GL):
+        try:
+            ctypes.CDLL(name)
+            found[name] = None
+        except OSError as error:
+            found[name] = str(error)
+    return found
+
+
+def _context(index: int) -> dict[str, Any]:
+    from rendergraph.gl.device import open_device
+
+    device = open_device(index)
+    try:
+        extensions, version = device.ctx.extensions, device.ctx.version_code
+        return device.as_json() | {
+            "gl": f"{version // 100}.{version // 10 % 10}",
+            "features": {
+                "OpenGL 4.5": version >= 450,
+                "compute shaders": version >= 430 or "GL_ARB_compute_shader" in extensions,
+                "texture views": version >= 430 or "GL_ARB_texture_view" in extensions,
+                "indirect multi-draw": version >= 430 or "GL_ARB_multi_draw_indirect" in extensions,
+                "depth bounds": bool(device.limits["depth_bounds"]),
+                "memory objects": "GL_EXT_memory_object" in extensions,
+            },
+            "limits": dict(device.limits),
+            "workarounds": [_STORED_BLOCKS] if device.stores_blocks else [],
+        }
+    finally:
+        device.release()
+
+
+def _main() -> None:
+    from rendergraph.gl.egl import devices
+
+    if len(sys.argv) > 1:
+        try:
+            print(json.dumps(_context(int(sys.argv[1]))))
+        except RendergraphError as error:
+            print(json.dumps({"problem": "; ".join(problem.message for problem in error.problems)}))
+        except Exception as error:  # `doctor` reports any failure
+            print(json.dumps({"problem": f"{type(error).__name__}: {error}"}))
+        return
+    try:
+        print(json.dumps({"libraries": _libraries(), "devices": devices(), "problem": None}))
+    except OSError as error:
+        print(json.dumps({"libraries": _libraries(), "devices": [], "problem": str(error)}))
+
+
+if __name__ == "__main__":
+    _main()

@@ -319,11 +319,9 @@ def _default(row: Entry) -> str:
 
 
 def _node_text(node: Entry) -> str:
-    inputs = [(p["name"], reference.meaning(p), ", ".join(reference.input_facts(p)), p["doc"]) for p in node["inputs"]]
-    outputs, internal = (
-        [(p["name"], reference.meaning(p), ", ".join(reference.output_facts(p)), p["doc"]) for p in node[key]]
-        for key in ("outputs", "internal")
-    )
+    def ports(key: str, facts: Callable[[Entry], list[str]]) -> list[tuple[str, ...]]:
+        return [(p["name"], reference.meaning(p), ", ".join(facts(p)), p["doc"]) for p in node[key]]
+
     parameters = [
         (p["name"], p["type"], f"{format_value(p['default'])} {p['unit']}".strip(), _range(p), p["doc"])
         for p in node["parameters"]
@@ -337,9 +335,9 @@ def _node_text(node: Entry) -> str:
         f"{node['name']}  ({node['family']})" if node["family"] else node["name"],
         node["doc"],
         f"Its exact twin, with the same outputs, is {node['twin']}." if node["twin"] else "",
-        section("Inputs", inputs),
-        section("Outputs", outputs),
-        section("Internal textures", internal),
+        section("Inputs", ports("inputs", reference.input_facts)),
+        section("Outputs", ports("outputs", reference.output_facts)),
+        section("Internal textures", ports("internal", reference.output_facts)),
         section("Parameters", parameters, ("name", "value", "default", "range", "")) if parameters else "",
         section("Choices added by plugins", added),
         section("To extend it or one of its bases", "\n".join(node["extends"])),

@@ -26,18 +26,12 @@ _FILE_KEYS = {key.name for key in PIPELINE.keys} - {"nodes", "outputs", "inputs"
 
 
 class PipelineText(Struct, eq=False):
-    """A pipeline file that is being edited.
-
-    Attributes:
-        text: its current text. A method that raises an `InputError` may leave a partial change.
-        path: its file, to which its paths are relative.
-        notes: further effects of the changes, one line each.
-    """
+    """A pipeline file that is being edited. A method that raises an `InputError` may leave a partial change."""
 
     text: str
-    path: Path
+    path: Path  # its file, to which its paths are relative
     catalog: Catalog
-    notes: list[str] = []
+    notes: list[str] = []  # further effects of the changes, one line each
 
     def add(self, id: str, node_type: str, values: Mapping[str, Any] = {}) -> None:
         """Add a node; `values` are its links and parameters, by name."""

@@ -31,10 +31,7 @@ def edit(text: str, path: Path, value: Any) -> str:
     """Return the text with a value at a path, or without an entry there if the value is `DELETED`.
 
     A value replaces the existing one, or is added after its siblings. A deleted entry's line or comma goes, too;
-    comments above it stay.
-
-    Raises:
-        InputError: (RG019) the text cannot be edited.
+    comments above it stay. Raise InputError (RG019) if the text cannot be edited.
     """
 
     def change(data: Any) -> None:

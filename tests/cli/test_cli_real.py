@@ -384,7 +384,7 @@ def test_doctor_survives_a_broken_driver(
     monkeypatch.setattr(doctor, "_SECONDS", 1)
     broken = [sys.executable, *instead]
     monkeypatch.setattr(
-        subprocess, "run", lambda words, **rest: run(broken if "rendergraph.cli.probe" in words else words, **rest)
+        subprocess, "run", lambda words, **rest: run(broken if "rendergraph.cli.doctor" in words else words, **rest)
     )
     result = cli("doctor", "--json")
     assert result.code == 5
