@@ -11,6 +11,7 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 from copy import copy
+from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
@@ -25,6 +26,7 @@ from rendergraph.errors import (
     Problem,
     RendergraphError,
     is_framework,
+    nearest,
     suggestion,
 )
 from rendergraph.version import __version__
@@ -47,6 +49,8 @@ VERBS = {verb: module for module, verbs in _MODULES.items() for verb in verbs}
 """The module of each verb, in the order of `--help`; the verb is the function of its name there."""
 
 INTERRUPTED = 130
+_FLOOR = 0.7
+"""Similarity below which a word is another word: `width` is not `watch` (0.6), `siez` is `size` (0.75)."""
 
 
 def verb(name: str) -> click.Command:
@@ -85,11 +89,10 @@ class _Verbs(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if args[0] not in VERBS and not args[0].startswith("-"):
-            from rendergraph.cli.suggestions import meant_by  # only needed for a misspelt verb
-            from rendergraph.resources import shipped_pipelines  # likewise
+            from rendergraph.resources import shipped_pipelines  # only needed for a misspelt verb
 
             is_pipeline = args[0] in shipped_pipelines() or args[0].endswith((".yaml", ".yml"))
-            meant = meant_by(args[0].lower(), "verbs") or (f"run {args[0]}" if is_pipeline else None)
+            meant = _meant_by(args[0].lower(), "verbs") or (f"run {args[0]}" if is_pipeline else None)
             hint = f"; did you mean '{meant}'?" if meant else suggestion(args[0], VERBS)
             ctx.fail(f"unknown verb '{args[0]}'{hint}")
         return super().resolve_command(ctx, args)
@@ -190,12 +193,45 @@ def fail(problems: Sequence[Problem], code: int, as_json: bool) -> int:
 def _usage(error: click.UsageError) -> Problem:
     path = error.ctx.command_path if error.ctx else "rendergraph"
     if isinstance(error, click.NoSuchOption) and error.ctx:
-        from rendergraph.cli.suggestions import unknown_option  # only needed here
-
-        text = unknown_option(error, error.ctx)
+        text = _unknown_option(error, error.ctx)
     else:
         text = " ".join(error.format_message().split()).rstrip(".")
     return Problem("RG500", f"{text[:1].lower()}{text[1:]}; see '{path} --help'")
+
+
+def _meant_by(word: str, kind: str) -> str | None:
+    """Return the entry for another program's word in `meanings`, `needless` or `verbs` of the table."""
+    import yaml  # only needed for a misspelt word
+
+    table = yaml.safe_load(Path(__file__).with_name("suggestions.yaml").read_text(encoding="utf-8"))
+    return next((advice for advice, words in table[kind].items() if word in words.split()), None)
+
+
+def _unknown_option(error: click.NoSuchOption, context: click.Context) -> str:
+    name = error.option_name
+    if not name.startswith("--"):  # click reports only the first letter of `-width`
+        name = next((word for word in context.obj or () if word.startswith(name)), name)
+    return f"unknown option '{name}'{_meant(name, context)}"
+
+
+def _meant(name: str, context: click.Context) -> str:
+    word = name.lstrip("-").partition("=")[0].lower().replace("_", "-")
+    own = _options(context.command)
+    if (advice := _meant_by(word, "meanings")) is not None:
+        # Only `run` writes pictures.
+        picture = advice.startswith("-o ") and "." in advice and context.command.name != "run"
+        known = advice.startswith("rendergraph") or (advice.partition(" ")[0] in own and not picture)
+        return f"; did you mean '{advice}'" + ("?" if known else " of `rendergraph run`?")
+    if (reason := _meant_by(word, "needless")) is not None:
+        return f"; leave it out: {reason}"
+    if (near := nearest(word, {option[2:] for option in own if option.startswith("--")}, floor=_FLOOR)) is not None:
+        return f"; did you mean '--{near}'?"
+    owners = [f"`{one}`" for one in VERBS if name in _options(verb(one))]
+    return f"; it is an option of {', '.join(owners)}" if owners else ""
+
+
+def _options(command: click.Command) -> list[str]:
+    return [option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)]
 
 
 def unexpected(error: BaseException) -> Problem:

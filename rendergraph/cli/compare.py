@@ -56,8 +56,7 @@ def _crop(text: str) -> tuple[int, int, int, int]:
     numbers = [int(part) for part in text.split(",") if part.strip().isdigit()]
     if len(numbers) != 4:
         raise ValueError(f"expected left, top, width and height in pixels, as in 40,20,32,32, got '{text}'")
-    x, y, width, height = numbers
-    return x, y, width, height
+    return numbers[0], numbers[1], numbers[2], numbers[3]
 
 
 measure_options = options.together(

@@ -76,6 +76,3 @@ def _exit_code(code: int, signalled: int, ending: AbstractSet[int]) -> int:
         text = f"the process {how}{during}; too little memory can cause this, or a driver bug: "
         text += "try a smaller --size, or another driver"
     return fail([Problem("RG622", text)], 1, as_json="--json" in sys.argv)
-
-
-__all__ = ["PATIENCE", "supervise"]

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import yaml
 
-from rendergraph.cli import suggestions
+from rendergraph.cli import app
 from rendergraph.cli.app import VERBS, verb
 
 
@@ -63,7 +63,7 @@ def test_an_unknown_option_is_answered_with_what_is_meant(cli: Any, typed: str, 
 
 def test_what_is_suggested_exists_and_no_word_stands_twice() -> None:
     known = {option for parameter in verb("run").params for option in parameter.opts}
-    table = yaml.safe_load(Path(suggestions.__file__).with_suffix(".yaml").read_text())
+    table = yaml.safe_load(Path(app.__file__).with_name("suggestions.yaml").read_text())
     for advice in table["meanings"]:
         first, second, *_ = advice.split()
         assert first in known or second in (*VERBS, "--version"), advice
