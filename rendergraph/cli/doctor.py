@@ -6,7 +6,6 @@ stdout: without an argument they list the EGL devices, with a number they open t
 
 from __future__ import annotations
 
-import ctypes
 import json
 import platform
 import re
@@ -151,6 +150,8 @@ def _text(report: dict[str, Any]) -> str:
 
 
 def _libraries() -> dict[str, str | None]:
+    import ctypes  # only the child process needs it
+
     found: dict[str, str | None] = {}
     for name in (system.EGL, system.GL):
         try:

@@ -68,27 +68,27 @@ def explain(topic: str, glsl: bool, pipeline: str | None, step: int | None, sele
         extensions = options.extensions(plugins) if topic == "scene" else None
         _print({"file": topic, "keys": reference.file_keys(topic, extensions)}, _keys_text, as_json)
     elif glsl:
-        linked, node = _node(topic, pipeline, select, plugins, partial(_unknown, topic))
+        linked, node = _node(topic, pipeline, select, partial(_unknown, topic))
         _print(reference.describe_program(linked, node, step), _program_text, as_json)
     else:
-        _node_or_file(topic, plugins, select, as_json)
+        _node_or_file(topic, select, as_json)
 
 
 def _node(
-    name: str, pipeline: str | None, select: Select, plugins: tuple[Path, ...], unknown: Callable[[Iterable[str]], str]
+    name: str, pipeline: str | None, select: Select, unknown: Callable[[Iterable[str]], str]
 ) -> tuple[Linked, str]:
     """Return a pipeline and the id of a node in it: a node of `--pipeline`, or that of a type in its example."""
     if pipeline is not None:
         return options.link(select(pipeline)), name
-    catalog = options.find_catalog(plugins, name)
+    catalog = options.find_catalog(select(name).plugins, name)
     if name not in catalog:
         raise InputError(Problem("RG511", unknown(catalog.names())))
     return reference.find_node_of_type(catalog.get(name), catalog, select)
 
 
-def _node_or_file(topic: str, plugins: tuple[Path, ...], select: Select, as_json: bool) -> None:
+def _node_or_file(topic: str, select: Select, as_json: bool) -> None:
     """Explain what a name refers to; one that is both a node type and a file is explained as both."""
-    catalog = options.find_catalog(plugins, topic)
+    catalog = options.find_catalog(select(topic).plugins, topic)
     entry, text = _other(topic, select, catalog)
     if topic in catalog:
         node_type = catalog.get(topic)
@@ -203,7 +203,7 @@ def schema(
     if (shader or pipeline) and not glsl:
         raise UsageError(Problem("RG500", "--shader and --pipeline require --glsl"))
     if glsl:
-        linked, node = _node(what, pipeline, partial(Selection, plugins=plugins), plugins, unknown)
+        linked, node = _node(what, pipeline, partial(Selection, plugins=plugins), unknown)
         options.put(reference.complete_shader(linked, node, shader), output, as_json=as_json)
         return
     if what in ("results", "results-csv"):

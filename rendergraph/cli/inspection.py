@@ -215,12 +215,11 @@ def diff(a: str, b: str, select: options.Select, svg: Path | None, as_json: bool
     if not missing:
         was, now = (figures(stages.plan(stages.expand(linked)).plan) for linked in (old, new))
         plans = was, now
-    written: dict[str, Any] = {}
     if svg is not None:
         options.write(diff_svg(old.graph, new.graph, difference), svg)
-        written["svg"] = str(svg)
     if as_json:
+        written = {"svg": str(svg)} if svg is not None else {}
         emit_json(diff_json(difference, plans) | written | {"missing": missing})
     else:
-        emit(written["svg"] if written else diff_text(difference, plans).rstrip("\n"))
+        emit(str(svg) if svg is not None else diff_text(difference, plans).rstrip("\n"))
     options.exit_if_missing(old, new)

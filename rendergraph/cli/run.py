@@ -119,7 +119,7 @@ def run(
         return RenderOptions(number, rate, timed=as_json, subframes=moments, turntable=circle, **modes)
 
     warned: set[object] = set()
-    read = partial(_read, selection, render_options, outputs, taps, tap_all, warned, resume=resume)
+    read = partial(_read, selection, render_options, (*outputs, *taps), tap_all, warned, resume=resume)
     draw = partial(_draw, sheet=tap_all, warned=warned, quiet=as_json)
     if watch:
         if executor is not None:
@@ -151,8 +151,7 @@ def run(
 def _read(
     selection: Selection,
     modes_of: Callable[[Linked], RenderOptions],
-    outputs: tuple[Target, ...],
-    taps: tuple[Target, ...],
+    targets: tuple[Target, ...],
     tap_all: Path | None,
     warned: set[object],
     *,
@@ -171,28 +170,27 @@ def _read(
     warn(linked.warnings, warned)
     modes = modes_of(linked)
     ending = ".####.png" if len(modes.frames) > 1 else ".png"
-    if not outputs and not taps and tap_all is None:
-        outputs = (Target("", _default(selection.label, ending)),)
+    if not targets and tap_all is None:
+        targets = (Target("", _default(selection.label, ending)),)
     if tap_all is not None:
         ports = every_port(stages.plan(stages.expand(linked, modes)))
-        taps += tuple(
+        targets += tuple(
             Target(port, tap_all / f"{number:02d}-{port.replace('/', '-')}{ending}", is_tap=True, on_sheet=True)
             for number, port in enumerate(ports, start=1)
         )
     named = []
-    for target in outputs:
+    for target in targets:
         picture = target.path.with_suffix(".png") if is_film(target.path) else target.path  # films consist of pictures
         extension(picture, ENDINGS)
         named.append(replace(target, name=target.name or images.output_for(picture, linked.graph.outputs)))
-    wanted = dict.fromkeys((*(target.name for target in named), *figures(linked.graph)))
-    tapped = dict.fromkeys(target.name for target in taps)
+    wanted = dict.fromkeys((*(target.name for target in named if not target.is_tap), *figures(linked.graph)))
+    tapped = dict.fromkeys(target.name for target in named if target.is_tap)
     expanded = stages.expand(linked, replace(modes, outputs=tuple(wanted), taps=tuple(tapped)))
-    targets = [*named, *taps]
     if tap_all is not None:
         _make_folder(tap_all)
-    _check(targets, expanded, map(Path, files))
-    warn(standstill_warning(expanded, film=any(is_film(target.path) for target in targets)), warned)
-    return (_resumed(expanded, targets) if resume else expanded), targets
+    _check(named, expanded, map(Path, files))
+    warn(standstill_warning(expanded, film=any(is_film(target.path) for target in named)), warned)
+    return (_resumed(expanded, named) if resume else expanded), named
 
 
 def _resumed(expanded: Expanded, targets: Sequence[Target]) -> Expanded:
@@ -313,8 +311,7 @@ def _with_sheet(files: Sequence[Saved], targets: Sequence[Target], path: Path) -
 def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path]) -> None:
     """Refuse output files that cannot be written, before anything is rendered; `files` are those that were read."""
     from rendergraph import images
-    from rendergraph.images.saving import extension
-    from rendergraph.images.video import ENDINGS, check_film, is_film
+    from rendergraph.images.video import check_film, is_film
 
     linked, numbers = expanded.linked, expanded.options.frames
     for name, port in expanded.requests.items():
@@ -328,8 +325,6 @@ def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path])
     for target in targets:
         if is_film(target.path):
             check_film(target.path)
-        else:
-            extension(target.path, ENDINGS)
         place = os.path.realpath(target.path)
         if place in seen:
             raise UsageError(Problem("RG502", f"two outputs have the same file '{target.path}'; name two files"))

@@ -198,12 +198,13 @@ class PipelineText(Struct, eq=False):
 
     def _passage(self, node_type: str) -> tuple[str, str]:
         """Return an input and the output that continues it, required inputs first."""
-        cls = self.catalog.get(node_type).cls if node_type in self.catalog else None
-        for name, port in sorted(cls.inputs().items(), key=lambda item: item[1].optional) if cls else ():
-            for out, made in cls.outputs().items() if cls else ():
-                means = getattr(made, "semantic", None)
-                if name in (out, getattr(made, "like", None)) or (means is not None and means == port.semantic):
-                    return name, out
+        if node_type in self.catalog:
+            cls = self.catalog.get(node_type).cls
+            for name, port in sorted(cls.inputs().items(), key=lambda item: item[1].optional):
+                for out, made in cls.outputs().items():
+                    means = getattr(made, "semantic", None)
+                    if name in (out, getattr(made, "like", None)) or (means is not None and means == port.semantic):
+                        return name, out
         raise _mistake("RG112", f"'{node_type}' has no output that continues an input; name both: INPUT OUTPUT")
 
     def _set(self, path: yaml_text.Path, value: Any) -> None:
