@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,13 +15,13 @@ from rendergraph.compare.batches import MOST_RUNS
 from rendergraph.compare.prepare import (
     SweepKeywords,
     SweepOptions,
+    View,
     by_view,
     measured_at,
     named_reference,
     prepare,
     prepare_variants,
     read_picture,
-    seen,
 )
 from rendergraph.compare.results import Comparison, Reference, Result, Results, Search, measure_against, pareto
 from rendergraph.compare.runner import Runner, SweepRunner
@@ -188,15 +189,11 @@ def sweep(
     if out is None:
         with tempfile.TemporaryDirectory(prefix="rendergraph-") as folder:
             return sweep(base, axes, folder, reference, options, size=size)
-    base, out, reference, space = (
-        as_pipeline(base).with_size(size),
-        Path(out),
-        named_reference(reference),
-        Space.of(axes),
-    )
+    base, out = as_pipeline(base).with_size(size), Path(out)
+    reference, space = named_reference(reference), Space.of(axes)
     space.check()
-    if len(views := by_view(space, reference, options.only)) > 1:
-        return _sweep_of_views(base, views, out, reference, options, space)
+    if views := by_view(space, reference, options):
+        return _sweep_of_views(base, views, out, options, space)
     with track_reads() as files:
         prepared = prepare(base, space, out, reference, options)
     runs = prepared.runs
@@ -233,33 +230,25 @@ def sweep(
     )
 
 
-def _sweep_of_views(
-    base: Pipeline,
-    views: Sequence[tuple[Mapping[str, str], Space, Sequence[int] | None]],
-    out: Path,
-    reference: Path | Pipeline | None,
-    options: SweepOptions,
-    space: Space,
-) -> Sweep:
+def _sweep_of_views(base: Pipeline, views: Sequence[View], out: Path, options: SweepOptions, space: Space) -> Sweep:
     """Sweep each scene, camera and environment separately: pictures of two scenes are not compared."""
     parts: list[Sweep] = []
     with report_progress(options.progress, "runs") as report:
-        for view, part, only in views:
-            done = sum(len(each.comparison.results) for each in parts)
+        for part, reference, own in views:
+            done = sum(map(len, parts))
             count = partial(lambda done, number, _: report(done + number, space.count()), done)
-            own = options.replace(resume=options.resume or bool(parts), only=only, progress=count)
-            parts.append(sweep(base, part, out, seen(reference, view), own))
-    first, names = parts[0].comparison, [run_name(run) for run in space.runs()]
-    results = sorted(
-        (r for part in parts for r in part.comparison.results), key=lambda result: names.index(result.name)
-    )
+            own = own.replace(resume=options.resume or bool(parts), progress=count)
+            parts.append(sweep(base, part, out, reference, own))
+    order = {run_name(run): number for number, run in enumerate(space.runs())}
+    comparisons = [part.comparison for part in parts]
+    first = comparisons[0]
     comparison = replace(
         first,
-        results=tuple(results),
-        scene=", ".join(dict.fromkeys(part.comparison.scene for part in parts)),
-        reference=first.reference if reference else replace(first.reference, name="the first of each scene"),
-        notes=tuple(dict.fromkeys(note for part in parts for note in part.comparison.notes)),
-        warnings=tuple(dict.fromkeys(problem for part in parts for problem in part.comparison.warnings)),
+        results=tuple(sorted(itertools.chain.from_iterable(parts), key=lambda result: order[result.name])),
+        scene=", ".join(dict.fromkeys(each.scene for each in comparisons)),
+        reference=first.reference if views[0][1] else replace(first.reference, name="the first of each scene"),
+        notes=tuple(dict.fromkeys(note for each in comparisons for note in each.notes)),
+        warnings=tuple(dict.fromkeys(problem for each in comparisons for problem in each.warnings)),
     )
     counts = ("executed", "alone", "resumed", "timed", "redrawn", "torn")
     return Sweep(
@@ -294,22 +283,14 @@ def compare_pictures(
     results = []
     for name, path, graph in zip(names, paths, graphs, strict=True):
         pixels = target if path is against else _read_like(path, reference_picture)
-        figures, flip_map = measure_against(pixels, reference_picture, str(path), extensions.metrics())
+        errors, flip_map = measure_against(pixels, reference_picture, str(path), extensions.metrics())
+        change = diff(graphs[0], graph) if graphs[0] and graph else None
         results.append(
-            Result(
-                name=name,
-                source=str(path),
-                pixels=pixels,
-                encoding=encoding,
-                metrics=figures,
-                flip_map=flip_map,
-                graph=graph,
-                difference=diff(graphs[0], graph) if graphs[0] and graph else None,
-            )
+            Result(name, str(path), pixels, encoding, errors, flip_map=flip_map, graph=graph, difference=change)
         )
     return Comparison(
         results=tuple(results),
-        reference=reference_picture if reference else Reference(names[0], "variant", target, encoding, output),
+        reference=reference_picture if reference else replace(reference_picture, name=names[0]),
         base=(names[0], graphs[0]) if graphs[0] else None,
         scene="",
         camera=None,

@@ -7,7 +7,7 @@ import hashlib
 import inspect
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import partial
 from importlib.machinery import ModuleSpec
@@ -57,11 +57,13 @@ def sources_digest(expanded: Expanded) -> str:
     Shaders count as they reach the driver, without comments; of Python code, the nodes' modules and what they import
     from their own package; of the scene, every file that was read. The version stands for the framework's own code.
     """
-    digest = hashlib.sha256()
     files = (file_digest(path) for path in sorted(map(Path, expanded.linked.scene.files)))
-    for text in (*_shader_texts(expanded), *_code(expanded.linked.graph), *files):
-        digest.update(hashlib.sha256(text.encode()).digest())
-    return digest.hexdigest()
+    return _texts_digest((*_shader_texts(expanded), *_code(expanded.linked.graph), *files))
+
+
+def _texts_digest(texts: Iterable[str]) -> str:
+    """Return the SHA-256 of the digests of texts, so that their boundaries count."""
+    return hashlib.sha256(b"".join(hashlib.sha256(text.encode()).digest() for text in texts)).hexdigest()
 
 
 def file_digest(path: Path) -> str:
@@ -81,18 +83,15 @@ def _shader_texts(expanded: Expanded) -> Iterator[str]:
     expansion = expanded.expansion
     types = {node.id: node.type for node in expanded.linked.graph.nodes}
     for step in expansion.steps:
-        sources = types, expansion.resources, expansion.views
+        sources = step, types, expansion.resources, expansion.views
         try:
-            yield _TEXTS.get(text_key(step, *sources), partial(_text_digest, step, *sources))
+            yield _TEXTS.get(text_key(*sources), partial(_stages_digest, *sources))
         except InputError as error:  # reported at its place when the run is rendered
             yield str(error)
 
 
-def _text_digest(*step_and_sources: Any) -> str:
-    digest = hashlib.sha256()
-    for text in stage_texts(*step_and_sources).values():
-        digest.update(hashlib.sha256(text.text.encode()).digest())
-    return digest.hexdigest()
+def _stages_digest(*step_and_sources: Any) -> str:
+    return _texts_digest(text.text for text in stage_texts(*step_and_sources).values())
 
 
 def _code(graph: Graph) -> Iterator[str]:
@@ -143,8 +142,6 @@ def _imported_names(file: Path, package: str) -> list[str]:
         if isinstance(statement, ast.Import):
             names += [alias.name for alias in statement.names]
         elif isinstance(statement, ast.ImportFrom):
-            base = statement.module or ""
-            if statement.level:
-                base = resolve_name("." * statement.level + base, package)
+            base = resolve_name("." * statement.level + (statement.module or ""), package)
             names += [base, *(f"{base}.{alias.name}" for alias in statement.names)]
     return names

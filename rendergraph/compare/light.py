@@ -8,7 +8,6 @@ Tarjan 1979): every path from the scene to the transform contains it.
 
 from __future__ import annotations
 
-import types
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,11 +41,7 @@ _SCENE, _PICTURE = Endpoint("", "scene"), Endpoint("", "picture")
 
 
 def light_of(graph: Graph) -> Endpoint:
-    """Return the port that holds the pipeline's light, of the picture's size.
-
-    Raises:
-        InputError: the picture has several sources of light, or none (RG525).
-    """
+    """Return the port that holds the pipeline's light, of the picture's size; there must be exactly one (RG525)."""
     import networkx as nx  # needed for a truth alone, and slow to import
 
     ports, shown = _ports(graph), graph.outputs.get("image", graph.outputs.get("radiance"))
@@ -96,10 +91,8 @@ def displayed(gpu: Gpu, planned: Planned, light: Endpoint, pixels: Pixels, outpu
     figures = [end for end in graph.textures if end in behind & read and _is_figure(graph.textures[end])]
     given = {light: pixels}
     if figures:
-        taps = tuple(map(str, figures))
-        tapped = stages.draw_last(
-            stages.expand(planned.linked, RenderOptions(frames=frames, outputs=(), taps=taps)), gpu
-        )
+        options = RenderOptions(frames=frames, outputs=(), taps=tuple(map(str, figures)))
+        tapped = stages.draw_last(stages.expand(planned.linked, options), gpu)
         given |= {end: tapped.arrays[str(end)] for end in figures}
     linked = replace(planned.linked, graph=_with_given(graph, given))
     return stages.draw_last(stages.expand(linked, RenderOptions(frames=frames, outputs=(output,))), gpu).arrays[output]
@@ -164,23 +157,21 @@ def _with_given(graph: Graph, contents: Mapping[Endpoint, Pixels]) -> Graph:
 
 def _given_class(values: npt.NDArray[np.float32]) -> type[Node]:
     """Return the class of a node whose texture holds these texels, (height, width, 4)."""
-    height, width = values.shape[:2]
+    size = {"SIZE_X": values.shape[1], "SIZE_Y": values.shape[0]}
 
-    def record(self: Any, steps: Steps) -> None:
-        steps.fullscreen("given.frag", texels=self.texels, out=self.color, defines={"SIZE_X": width, "SIZE_Y": height})
+    class Given(Node):
+        """A texture with given contents."""
 
-    def update(self: Any, frame: Frame) -> None:
-        frame.write(self.texels, values)
+        texels = Internal(AnyTexel, kind="buffer", bytes=values.nbytes)
+        color = Output(AnyTexel, doc="The texture.")
 
-    body = {
-        "__module__": __name__,
-        "__doc__": "A texture with given contents.",
-        "texels": Internal(AnyTexel, kind="buffer", bytes=values.nbytes),
-        "color": Output(AnyTexel, doc="The texture."),
-        "record": record,
-        "update": update,
-    }
-    return types.new_class("Given", (Node,), exec_body=lambda space: space.update(body))
+        def record(self, steps: Steps) -> None:
+            steps.fullscreen("given.frag", texels=self.texels, out=self.color, defines=size)
+
+        def update(self, frame: Frame) -> None:
+            frame.write(self.texels, values)
+
+    return Given
 
 
 def _four_channels(pixels: Pixels) -> npt.NDArray[np.float32]:

@@ -48,6 +48,8 @@ _INTEGER_FORMATS = frozenset(name for name, format in FORMATS.items() if format.
 
 Pictures: TypeAlias = Literal["all", "best"]
 Events: TypeAlias = Callable[[Mapping[str, Any]], None]
+View: TypeAlias = "tuple[Space, Path | Pipeline | None, SweepOptions]"
+"""The runs of one scene, camera and environment, their reference, and which of them to render."""
 
 
 class SweepKeywords(TypedDict, total=False):
@@ -281,10 +283,8 @@ def prepare(
     """Plan the runs of a sweep, with the arguments of `sweep`."""
     space = Space.of(axes)
     space.check()
-    if len(views := by_view(space, reference, options.only)) > 1:
-        parts = [
-            prepare(base, part, out, seen(reference, view), options.replace(only=only)) for view, part, only in views
-        ]
+    if views := by_view(space, reference, options):
+        parts = [prepare(base, part, out, own_reference, own) for part, own_reference, own in views]
         by_name = {run.name: run for part in parts for run in part.runs}
         names = [run_name(run) for run in space.runs()]
         ordered = [by_name[name] for name in names if name in by_name]
@@ -316,34 +316,32 @@ def prepare(
     return replace(prepared, runs=runs, space=space, study=_study(base, options.frame, reference_name))
 
 
-def by_view(
-    space: Space, reference: Path | Pipeline | None, only: Sequence[int] | None = None
-) -> list[tuple[dict[str, str], Space, tuple[int, ...] | None]]:
+def by_view(space: Space, reference: Path | Pipeline | None, options: SweepOptions) -> list[View]:
     """Return the runs of each scene, camera and environment that axes choose, which are compared with each other alone.
 
-    Against a pipeline, so are those of each value in a scene: the reference is rendered with it, too. Each comes with
-    its settings, its space, and which of its runs to render, as `SweepOptions.only` has it.
+    Against a pipeline, so are those of each value in a scene: the reference is rendered with it, too. The list is empty
+    if all runs are compared with each other.
     """
-    paths = [axis.path for axis in space.axes]
-    paths = [p for p in paths if p in VIEW or (isinstance(reference, Pipeline) and p.startswith("scene."))]
+    scene_too = isinstance(reference, Pipeline)
+    paths = [a.path for a in space.axes if a.path in VIEW or (scene_too and a.path.startswith("scene."))]
     groups: dict[tuple[tuple[str, str], ...], list[int]] = {}
     runs = space.runs()
     for number, run in enumerate(runs):
         groups.setdefault(tuple((path, run[path]) for path in paths), []).append(number)
-    found = []
-    for view, numbers in groups.items():
-        chosen = None if only is None else tuple(place for place, number in enumerate(numbers) if number in only)
-        if chosen != ():
-            found.append((dict(view), replace(space, chosen=tuple(runs[number] for number in numbers)), chosen))
-    return found
-
-
-def seen(reference: Path | Pipeline | None, view: Mapping[str, str]) -> Path | Pipeline | None:
-    """Return the reference with the scene, the camera and the environment of the runs that are compared with it."""
+    if options.only is not None:
+        groups = {view: numbers for view, numbers in groups.items() if not set(options.only).isdisjoint(numbers)}
+    if len(groups) < 2:
+        return []
     if isinstance(reference, Path):
         text = f"a picture cannot be the reference of several scenes; name a pipeline instead of '{reference}'"
         raise UsageError(Problem("RG500", text))
-    return reference if reference is None else reference.set(view)
+    views: list[View] = []
+    for view, numbers in groups.items():
+        own, only = None if reference is None else reference.set(dict(view)), options.only
+        places = None if only is None else [place for place, number in enumerate(numbers) if number in only]
+        part = replace(space, chosen=tuple(runs[number] for number in numbers))
+        views.append((part, own, options.replace(only=places)))
+    return views
 
 
 def prepare_variants(
@@ -359,11 +357,10 @@ def prepare_variants(
     With `twins`, and against a truth, their techniques' twins are planned, too.
     """
     others = [reference] if isinstance(reference, Pipeline) else []
-    is_truth = options.metric is None and any(
-        {"radiance", "variance"} <= o.resolve().spec.outputs.keys() for o in others
-    )
+    accumulates = any({"radiance", "variance"} <= other.resolve().spec.outputs.keys() for other in others)
+    is_truth, count = accumulates and options.metric is None, len(variants)
     matched, notes = match_scene_and_size([*variants, *others])
-    names = unique_names(names or [pipeline.link().graph.name for pipeline in matched[: len(variants)]])
+    names = unique_names(names or [pipeline.link().graph.name for pipeline in matched[:count]])
     if is_truth:
         matched[-1] = _seen_as(matched[:-1], names, matched[-1], notes)
     planned = [pipeline.check() for pipeline in matched]
@@ -372,30 +369,22 @@ def prepare_variants(
         raise UsageError(Problem("RG500", f"{text}: a pipeline with the outputs `radiance` and `variance`"))
     graphs = [each.linked.graph for each in planned]
     picture = read_picture(reference, graphs[0].size, names[0]) if isinstance(reference, Path) else None
-    compared = graphs[: len(variants)] if is_truth else graphs
+    compared = graphs[:count] if is_truth else graphs
     output, encoding = compared_output(compared, picture[1] if picture else None, measured=options.metric is not None)
-    called = [*names, *(graph.name for graph in graphs[len(variants) :])]
     runs = [
-        Run(
-            number if number < len(variants) else -1,
-            name,
-            each,
-            output,
-            options.frame,
-            light=light_of(each.linked.graph) if is_truth and number < len(variants) else None,
-        )
-        for number, (name, each) in enumerate(zip(called, planned, strict=True))
+        Run(number, name, each, output, options.frame, light=light_of(each.linked.graph) if is_truth else None)
+        for number, (name, each) in enumerate(zip(names, planned[:count], strict=True))
     ]
-    found: list[Twin] = []
-    for run, pipeline in zip(runs, matched, strict=False) if is_truth and twins else ():
-        found += _twins(run, pipeline, notes)
+    other = Run(-1, graphs[-1].name, planned[-1], output, options.frame) if others else None
+    pairs = zip(runs, matched[:count], strict=True) if is_truth and twins else ()
+    found = [twin for run, pipeline in pairs for twin in _twins(run, pipeline, notes)]
     return Prepared(
-        runs=tuple(runs[: len(variants)]),
+        runs=tuple(runs),
         output=output,
         encoding=encoding,
         picture=Reference(str(reference), "file", picture[0], encoding, output) if picture else None,
-        other=runs[-1] if others and not is_truth else None,
-        truth=runs[-1] if is_truth else None,
+        other=None if is_truth else other,
+        truth=other if is_truth else None,
         twins=tuple(found),
         notes=tuple(notes),
     )
@@ -444,8 +433,6 @@ def _told(variant: Pipeline, truth: Pipeline) -> dict[str, Any]:
 
 def _twins(run: Run, pipeline: Pipeline, notes: list[str]) -> Iterator[Twin]:
     """Yield a run for each technique that has a twin, with the twin in its place; add a note where it does not fit."""
-    if run.light is None:
-        return  # the truth itself
     linked = run.planned.linked
     catalog, needed = linked.catalog, run.planned.plan.schedule.steps
     used = {step.node for step in needed} | {function.node for step in needed for function in step.functions}

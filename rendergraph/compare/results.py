@@ -23,7 +23,6 @@ from rendergraph.diff import GraphDiff, diff_json
 from rendergraph.errors import Place, Problem, suggestion
 from rendergraph.installed import require, versions
 from rendergraph.metrics import Encoding, Metrics
-from rendergraph.session.frame import not_finite
 from rendergraph.system import processor
 
 if TYPE_CHECKING:
@@ -83,8 +82,7 @@ class TwinError:
     reduction: float | None
 
     def as_json(self) -> dict[str, Any]:
-        fields = ("type", "twin", "relative_mse", "reduction")
-        return {name: getattr(self, name) for name in fields}
+        return {name: getattr(self, name) for name in ("type", "twin", "relative_mse", "reduction")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,16 +204,16 @@ class Result:
     @property
     def cause(self) -> str:
         """The technique whose twin reduces the error most, as a sentence; empty without twins."""
-        known = [one for one in self.error_by if one.relative_mse is not None and one.reduction is not None]
+        known = [(one, one.reduction) for one in self.error_by if one.reduction is not None]
         if not known:
             return ""
-        one = known[0]
-        if one.reduction is None or one.reduction <= 0:
-            return f"no twin reduces its error, which has other causes than {', '.join(e.node for e in known)}"
-        part = "most" if one.reduction > 0.5 else "the largest known part"
+        one, reduction = known[0]
+        if reduction <= 0:
+            return f"no twin reduces its error, which has other causes than {', '.join(e.node for e, _ in known)}"
+        part = "most" if reduction > 0.5 else "the largest known part"
         return (
             f"{part} of its error comes from {one.node} ({one.type}): with {one.twin} the relative MSE is "
-            f"{one.relative_mse:.4g}, {100 * one.reduction:.3g} % smaller"
+            f"{one.relative_mse:.4g}, {100 * reduction:.3g} % smaller"
         )
 
     @property
@@ -223,16 +221,15 @@ class Result:
         if not self.not_finite:
             return ()
         text = f"{self.not_finite} pixels of its outputs are NaN or infinite"
-        way = "run … --tap-all FOLDER shows where they begin"
-        return (Problem("RG619", f"{text}; {way}", Place(self.name), severity="warning"),)
+        text += "; run … --tap-all FOLDER shows where they begin"
+        return (Problem("RG619", text, Place(self.name), severity="warning"),)
 
     def as_json(self) -> dict[str, Any]:
         document: dict[str, Any] = {"name": self.name, "pipeline" if self.memory else "picture": self.source}
         if self.settings:
             document["settings"] = typed_settings(self.settings)
         document |= self.metrics.as_json()
-        document |= {"radiance_rmse": self.radiance_rmse, "relative_mse": self.relative_mse}
-        document |= {"not_finite": self.not_finite}
+        document |= {name: getattr(self, name) for name in ("radiance_rmse", "relative_mse", "not_finite")}
         if self.error_by:
             document["error_by"] = {one.node: one.as_json() for one in self.error_by}
         if self.figures:
@@ -265,11 +262,10 @@ class Results(ABC):
     def __getitem__(self, name: str | int) -> Result:
         if isinstance(name, int):
             return self.results[name]
-        found = next((result for result in self.results if result.name == name), None)
-        if found is None:
-            names = [result.name for result in self.results]
-            raise KeyError(f"there is no result '{name}'{suggestion(name, names)}")
-        return found
+        by_name = {result.name: result for result in self.results}
+        if name not in by_name:
+            raise KeyError(f"there is no result '{name}'{suggestion(name, by_name)}")
+        return by_name[name]
 
     def to_dict(self) -> dict[str, list[Any]]:
         """Return the table as lists by column; None is an unknown value."""
@@ -395,20 +391,15 @@ def light_errors(light: Pixels | None, reference: Reference) -> dict[str, Any]:
     if light is None or reference.light is None:
         return {}
     own, other = metrics.colors(light), metrics.colors(reference.light)
-    errors: dict[str, Any] = {"radiance_rmse": metrics.rmse(own, other)}
-    errors["relative_mse"] = metrics.relative_mse(own, other)
-    if reference.noise is not None:
-        errors["signed_map"] = metrics.signed_difference(own, other).astype(np.float16)
-    return errors
+    errors = {"radiance_rmse": metrics.rmse(own, other), "relative_mse": metrics.relative_mse(own, other)}
+    if reference.noise is None:
+        return errors
+    return {**errors, "signed_map": metrics.signed_difference(own, other).astype(np.float16)}
 
 
 def smallest_error(results: Sequence[Result]) -> float | None:
     """Return the smallest relative mean square error of light, None if none is known."""
     return min((r.relative_mse for r in results if r.relative_mse is not None), default=None)
-
-
-def not_finite_pixels(graph: Graph, arrays: Mapping[str, Pixels]) -> int:
-    return sum(not_finite(pixels, graph.textures[graph.outputs[name]].semantic.name) for name, pixels in arrays.items())
 
 
 # --- the best --------------------------------------------------------------------------------------------------------
@@ -433,26 +424,27 @@ def objective_values(result: Result | None, objectives: Sequence[str]) -> list[f
     return numbers if len(numbers) == len(values) else None
 
 
-def pareto_front(values: Mapping[K, Sequence[float]]) -> tuple[K, ...]:
-    """Return the Pareto front: keys for which no other one is as good in every value and better in one.
+def pareto_front(values: Mapping[K, Sequence[float] | None]) -> tuple[K, ...]:
+    """Return the Pareto front, sorted by the first value: no other key is as good in every value and better in one.
 
-    They are sorted by the first value.
+    Keys without values are not on it.
     """
+    known = {key: tuple(own) for key, own in values.items() if own is not None}
 
     def beats(one: Sequence[float], other: Sequence[float]) -> bool:
-        return tuple(one) != tuple(other) and all(a <= b for a, b in zip(one, other, strict=True))
+        return one != other and all(a <= b for a, b in zip(one, other, strict=True))
 
     front: list[K] = []
-    for key in sorted(values, key=lambda key: tuple(values[key])):  # one that beats another is sorted before it
-        if not any(beats(values[other], values[key]) for other in front):
+    for key in sorted(known, key=known.__getitem__):  # one that beats another is sorted before it
+        if not any(beats(known[other], known[key]) for other in front):
             front.append(key)
     return tuple(front)
 
 
 def pareto(results: Sequence[Result]) -> list[Result]:
     """Return the results of which no other one is both faster and more accurate (FLIP), fastest first."""
-    values = {number: objective_values(result, ("ms", "flip")) for number, result in enumerate(results)}
-    return [results[number] for number in pareto_front({key: own for key, own in values.items() if own is not None})]
+    front = pareto_front({number: objective_values(result, ("ms", "flip")) for number, result in enumerate(results)})
+    return [results[number] for number in front]
 
 
 @dataclass(frozen=True)
@@ -472,13 +464,13 @@ class Search:
     front: tuple[str, ...]
 
     def as_json(self) -> dict[str, Any]:
-        asked = [{"name": name, "values": self.values.get(name) if name else None} for name in self.order]
+        asked = [{"name": name, "values": self.values.get(name or "")} for name in self.order]
         return {"minimise": list(self.minimise), "budget": self.budget, "asked": asked, "front": list(self.front)}
 
     def improvements(self) -> list[tuple[int, float]]:
         steps: list[tuple[int, float]] = []
         for number, name in enumerate(self.order, 1):
-            values = self.values.get(name) if name is not None else None
+            values = self.values.get(name or "")
             if values is not None and (not steps or values[0] < steps[-1][1]):
                 steps.append((number, values[0]))
         return steps

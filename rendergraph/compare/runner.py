@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from rendergraph.compare import store, tasks
 from rendergraph.compare.batches import MOST_RUNS, Batch, batches, group_similar
 from rendergraph.compare.fingerprint import run_key
 from rendergraph.compare.prepare import Prepared, Run, SweepOptions
@@ -22,26 +23,6 @@ from rendergraph.compare.results import (
     passes,
     smallest_error,
     typed_settings,
-)
-from rendergraph.compare.store import (
-    RESULTS,
-    Failure,
-    ResultsLog,
-    RunRecord,
-    SweepFolder,
-    check_folder,
-    find_record,
-    restored_result,
-)
-from rendergraph.compare.tasks import (
-    ComparisonTask,
-    PassCount,
-    ReferenceResult,
-    ReferenceTask,
-    RenderedResult,
-    TaskError,
-    TimingResult,
-    VariantTask,
 )
 from rendergraph.compare.truth import TruthProgress, TruthTask, TwinResult, TwinTask, noise_note, representatives
 from rendergraph.errors import Problem, RendergraphError
@@ -79,7 +60,7 @@ class Runner:
         elif self.prepared.other is not None or 0 in self.results:
             kind: Literal["variant", "pipeline"] = "variant" if self.prepared.other is None else "pipeline"
             base = self.prepared.base.for_task()
-            farm.submit(ReferenceTask(base.name, base, kind, self.prepared.encoding, self.options.frame))
+            farm.submit(tasks.ReferenceTask(base.name, base, kind, self.prepared.encoding, self.options.frame))
         elif self._waiting:
             first = self._waiting.pop(0)
             if farm.workers > 1 and len(first) > 1:  # all others wait for the first run
@@ -112,7 +93,7 @@ class Runner:
             for event in farm.events():
                 if not isinstance(event, TaskOutput):
                     self._task_event(farm, event)
-                elif isinstance(event.value, ReferenceResult):
+                elif isinstance(event.value, tasks.ReferenceResult):
                     found, self.device = event.value.reference, event.value.origin["device"]
                 else:
                     at = event.value
@@ -160,7 +141,7 @@ class Runner:
         return min(self._outputs, total), total
 
     def _submit(self, farm: Executor, numbers: Sequence[int]) -> None:
-        farm.submit(ComparisonTask(**self._work(numbers), base=self.prepared.base.for_task()))
+        farm.submit(tasks.ComparisonTask(**self._work(numbers), base=self.prepared.base.for_task()))
 
     def _work(self, numbers: Sequence[int]) -> dict[str, Any]:
         runs, options = self.prepared.runs, self.options
@@ -185,27 +166,27 @@ class Runner:
 
     def _take(self, farm: Executor, output: Any, worker: str) -> None:
         """Store an output of a task; a task that was restarted yields some of them twice."""
-        if isinstance(output, ReferenceResult):
+        if isinstance(output, tasks.ReferenceResult):
             self.device = output.origin["device"]
             if self.reference is None:
                 self._distribute(farm, output.reference)
             return
         self._outputs += 1
-        if isinstance(output, RenderedResult):
+        if isinstance(output, tasks.RenderedResult):
             self.warnings += output.warnings
             if output.number not in self.results:
                 self._rendered(output)
-        elif isinstance(output, TimingResult):
+        elif isinstance(output, tasks.TimingResult):
             self._timed(output, worker)
         elif isinstance(output, TwinResult):
             self.twins.setdefault(output.twin.number, []).append(output)
 
-    def _rendered(self, output: RenderedResult) -> None:
+    def _rendered(self, output: tasks.RenderedResult) -> None:
         run = self.prepared.runs[output.number]
         self.device = output.origin["device"]
         self.results[output.number] = Result.of(run.name, run.planned, settings=run.settings, **output.measured)
 
-    def _timed(self, output: TimingResult, worker: str) -> None:
+    def _timed(self, output: tasks.TimingResult, worker: str) -> None:
         self.results[output.number] = replace(self.results[output.number], times=output.times)
 
     def _task_event(self, farm: Executor, event: TaskFinished | TaskRetried | TaskFailed) -> None:
@@ -224,20 +205,20 @@ class SweepRunner(Runner):
     runs would need without sharing.
     """
 
-    def __init__(self, prepared: Prepared, options: SweepOptions, folder: SweepFolder) -> None:
+    def __init__(self, prepared: Prepared, options: SweepOptions, folder: store.SweepFolder) -> None:
         super().__init__(prepared, options)
         self.folder = folder
-        self.records: dict[int, RunRecord] = {}
-        self.failures: dict[int, Failure] = {}
+        self.records: dict[int, store.RunRecord] = {}
+        self.failures: dict[int, store.Failure] = {}
         self.executed = self.alone = 0
         self._begun, self._completed = time.monotonic(), 0
         for number, run in enumerate(prepared.runs):
-            record = find_record(run, folder.lines, pictures=options.kept == "all")
+            record = store.find_record(run, folder.lines, pictures=options.kept == "all")
             if record is None:
                 continue
             if record.frames and run.key not in folder.lines:  # its line was lost
                 folder.append(record.as_json())
-            self.results[number], self.records[number] = restored_result(run, record, prepared.encoding), record
+            self.results[number], self.records[number] = store.restored_result(run, record, prepared.encoding), record
             self.device = record.device
         self._drop_pictures(self._beaten())
 
@@ -259,31 +240,28 @@ class SweepRunner(Runner):
         return total - len(self.missing), total
 
     def _submit(self, farm: Executor, numbers: Sequence[int]) -> None:
-        farm.submit(VariantTask(**self._work(numbers)))
+        farm.submit(tasks.VariantTask(**self._work(numbers)))
 
     def _take(self, farm: Executor, output: Any, worker: str) -> None:
-        if isinstance(output, PassCount):
+        if isinstance(output, tasks.PassCount):
             self.executed += output.count
-        elif isinstance(output, TaskError):
+        elif isinstance(output, tasks.TaskError):
             self._fail(output.number, output.error)
             self._report("run", worker, run=self.prepared.runs[output.number].name, failed=True)
         else:
             super()._take(farm, output, worker)
 
-    def _rendered(self, output: RenderedResult) -> None:
+    def _rendered(self, output: tasks.RenderedResult) -> None:
         super()._rendered(output)
-        number = output.number
-        self.records[number] = self.folder.keep(
-            self.prepared.runs[number], self.results[number], output.picture, output.origin
-        )
+        run, result = self.prepared.runs[output.number], self.results[output.number]
+        self.records[output.number] = self.folder.keep(run, result, output.picture, output.origin)
 
-    def _timed(self, output: TimingResult, worker: str) -> None:
+    def _timed(self, output: tasks.TimingResult, worker: str) -> None:
         number = output.number
         if self.is_complete(number):
             return
         super()._timed(output, worker)
-        run, record = self.prepared.runs[number], self.records[number]
-        beaten = self._beaten()
+        run, record, beaten = self.prepared.runs[number], self.records[number], self._beaten()
         record = record.without_picture() if number in beaten else record
         self.records[number] = record.timed(output.times, output.origin)
         self.folder.write(run, self.records[number])
@@ -299,13 +277,8 @@ class SweepRunner(Runner):
         """
         if self.options.kept == "all":
             return set()
-        rendered = {
-            number: result
-            for number, result in self.results.items()
-            if result.times.frames and result.pixels is not None
-        }
-        values = {number: objective_values(result, self.options.best) for number, result in rendered.items()}
-        kept = set(pareto_front({number: own for number, own in values.items() if own is not None}))
+        rendered = {n: own for n, own in self.results.items() if own.times.frames and own.pixels is not None}
+        kept = set(pareto_front({n: objective_values(own, self.options.best) for n, own in rendered.items()}))
         if (self.prepared.other or self.prepared.truth) is None and (
             self.reference is None or self.reference.kind == "variant"
         ):
@@ -330,7 +303,7 @@ class SweepRunner(Runner):
 
     def _task_failed(self, farm: Executor, event: TaskFailed) -> None:
         """Retry each run of a failed task alone; a task of one run is not retried."""
-        if not isinstance(event.task, VariantTask):
+        if not isinstance(event.task, tasks.VariantTask):
             raise event.error
         missing = set(self.missing)
         left = [run.number for run in event.task.runs if run.number in missing]
@@ -396,24 +369,22 @@ class Listing:
         return {number: at for at, group in enumerate(self.groups, 1) for number in group.numbers}
 
     def as_json(self) -> dict[str, Any]:
-        group_of, shared = self.group_of(), self.shared()
+        group_of, shared, runs = self.group_of(), self.shared(), self.prepared.runs
         return {
             "runs": [
                 {
                     "name": run.name,
                     "settings": typed_settings(run.settings),
-                    "kept": number in self.kept,
-                    "group": group_of.get(number),
+                    "kept": n in self.kept,
+                    "group": group_of.get(n),
                 }
-                for number, run in enumerate(self.prepared.runs)
+                for n, run in enumerate(runs)
             ],
             "groups": [
                 {
                     "runs": len(group.numbers),
                     "passes": group.pass_count,
-                    "passes_one_by_one": sum(
-                        len(passes(self.prepared.runs[number].planned.plan)) for number in group.numbers
-                    ),
+                    "passes_one_by_one": sum(len(passes(runs[number].planned.plan)) for number in group.numbers),
                     "allocated_bytes": group.planned.plan.memory.allocated_bytes,
                 }
                 for group in self.groups
@@ -429,11 +400,10 @@ class Listing:
 
 def list_sweep(prepared: Prepared, out: Path | None = None, options: SweepOptions = SweepOptions()) -> Listing:
     """Return what `sweep` would render into a folder; without one, no run is complete."""
-    numbers = range(len(prepared.runs))
-    kept: frozenset[int] = frozenset()
+    numbers, kept = range(len(prepared.runs)), frozenset[int]()
     if out is not None:
-        check_folder(out, prepared.study, resume=options.resume)
-        lines, _ = ResultsLog(out / RESULTS).by_key()
+        store.check_folder(out, prepared.study, resume=options.resume)
+        lines, _ = store.ResultsLog(out / store.RESULTS).by_key()
         kept = frozenset(number for number in numbers if is_complete(prepared.runs[number], lines, options))
     waiting = [number for number in numbers if number not in kept]
     groups = batches([run.planned for run in prepared.runs], waiting, options.most_bytes)
@@ -441,5 +411,5 @@ def list_sweep(prepared: Prepared, out: Path | None = None, options: SweepOption
 
 
 def is_complete(run: Run, lines: Mapping[str, dict[str, Any]], options: SweepOptions) -> bool:
-    record = find_record(run, lines, pictures=options.kept == "all")
+    record = store.find_record(run, lines, pictures=options.kept == "all")
     return record is not None and bool(record.frames) and record.times.covers(options.frames, options.repeats)

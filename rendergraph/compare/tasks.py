@@ -14,27 +14,18 @@ import numpy as np
 from rendergraph.compare.batches import Batch, fitting_batches, measure_batch, node_types, render_batch
 from rendergraph.compare.light import LIGHT, with_light
 from rendergraph.compare.prepare import Run
-from rendergraph.compare.results import (
-    Difference,
-    Pixels,
-    Reference,
-    light_errors,
-    machine,
-    measure_against,
-    not_finite_pixels,
-    passes,
-)
+from rendergraph.compare.results import Difference, Pixels, Reference, light_errors, machine, measure_against, passes
 from rendergraph.compare.timing import Times, times_of
 from rendergraph.declare import InOut, Output
 from rendergraph.diff import GraphDiff, diff
-from rendergraph.errors import InputError, Problem, RenderError
+from rendergraph.errors import InputError, Problem, RenderError, RendergraphError
 from rendergraph.farm import Handle, Task, Worker
 from rendergraph.farm.bundle import map_remote_paths
 from rendergraph.farm.tasks import is_retryable
-from rendergraph.link import Endpoint, Graph
+from rendergraph.link import Endpoint
 from rendergraph.metrics import Encoding
 from rendergraph.session import RenderOptions, stages
-from rendergraph.session.frame import figures_of
+from rendergraph.session.frame import figures_of, not_finite
 
 if TYPE_CHECKING:
     from rendergraph.allocate import ResourcePlan
@@ -79,7 +70,7 @@ class TaskError:
     """A run cannot be rendered or compared, on any worker."""
 
     number: int
-    error: InputError | RenderError
+    error: RendergraphError
 
 
 @dataclass(frozen=True)
@@ -120,14 +111,13 @@ class VariantTask(Task):
             except InputError as error:
                 if not self.needs:
                     raise
-                yield TaskError(run.number, _mapped(error, worker))
+                yield TaskError(run.number, map_remote_paths(error, worker.root))
         planned = [each for _, each in runs]
         reference = self.reference(worker)
         waiting = fitting_batches(planned, range(len(runs)), self.most_bytes) if runs else []
         done: set[int] = set()
         while waiting:
             batch = waiting.pop(0)
-            first = batch.numbers[0]
             try:
                 for event in self._batch(worker, batch, runs, reference):
                     if isinstance(event, ReferenceResult):
@@ -142,7 +132,7 @@ class VariantTask(Task):
                 elif reference is None or is_retryable(error):
                     raise
                 else:
-                    yield TaskError(runs[first][0].number, _mapped(error, worker))
+                    yield TaskError(runs[batch.numbers[0]][0].number, map_remote_paths(error, worker.root))
 
     def _batch(
         self, worker: Worker, batch: Batch, runs: Sequence[tuple[Run, Planned]], reference: Reference | None
@@ -241,7 +231,7 @@ def _rendered(
         "metrics": errors,
         "flip_map": flip_map,
         **light_errors(arrays.get(LIGHT, arrays.get("radiance")), reference),
-        "not_finite": not_finite_pixels(graph, arrays),
+        "not_finite": sum(not_finite(a, graph.textures[graph.outputs[n]].semantic.name) for n, a in arrays.items()),
         "figures": figures_of(arrays),
     }
     picture = _encoded(run, graph, pixels) if encode else b""
@@ -272,12 +262,6 @@ def origin_of(worker: Worker) -> Origin:
         worker.cache["origin"] = {"device": worker.gpu.device.as_json(), "machine": machine()}
     origin: Origin = worker.cache["origin"]
     return origin
-
-
-def _mapped(error: InputError | RenderError, worker: Worker) -> InputError | RenderError:
-    mapped = map_remote_paths(error, worker.root)
-    assert isinstance(mapped, InputError | RenderError)  # of the same class
-    return mapped
 
 
 def every_output(gpu: Gpu, planned: Planned, frame: int) -> Frame:

@@ -101,9 +101,8 @@ class TruthTask(Task):
     def run(self, worker: Worker) -> Iterator[TruthProgress | ReferenceResult]:
         planned, frame = self.truth.plan(worker), self.truth.frame
         lights = [_light(worker.gpu, run.plan(worker), run) for run in self.runs]
-        stored = _load(self.key)
-        found = stored if stored is not None and _is_enough(stored, lights, self.limits) else None
-        if found is None:
+        found = _load(self.key)
+        if found is None or not _is_enough(found, lights, self.limits):
             for each in draw_truth(worker.gpu, planned, frame, lights, self.limits):
                 if isinstance(each, Truth):
                     found = each
@@ -161,12 +160,8 @@ def draw_truth(
 ) -> Iterator[TruthProgress | Truth]:
     """Render the truth at a frame's time; yield its progress after each frame, and finally the truth.
 
-    Args:
-        gpu: where to render; nothing else may be rendered there meanwhile.
-        planned: the pipeline of the truth.
-        frame: the frame whose scene is rendered repeatedly; frame numbers advance, so samples differ.
-        lights: the light that will be measured against it, (height, width, channels) each.
-        limits: when it is accurate enough.
+    The scene stands still, while frame numbers advance, so samples differ. `lights`, (height, width, channels) each,
+    will be measured against it. Nothing else may be rendered on the GPU meanwhile.
     """
     names = tuple(name for name in ("radiance", "variance", "samples_taken") if name in planned.linked.graph.outputs)
     options = RenderOptions(frames=range(frame, frame + 1), still=frame, outputs=names)
@@ -253,13 +248,7 @@ def _load(key: str) -> Truth | None:
 def _save(key: str, truth: Truth) -> None:
     """Cache a truth. If the disk is full or read-only, it will only have to be rendered again."""
     data = io.BytesIO()
-    np.savez(
-        data,
-        radiance=truth.radiance,
-        variance=truth.variance,
-        samples=np.int64(truth.samples),
-        seconds=np.float64(truth.seconds),
-    )
+    np.savez(data, **vars(truth))
     folder = cache_folder()
     with contextlib.suppress(OSError, RenderError):
         folder.mkdir(parents=True, exist_ok=True)
