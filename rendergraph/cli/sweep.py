@@ -350,13 +350,13 @@ def farm(
             raise UsageError(Problem("RG500", f"--runs: there is no run {most}; the sweep has {amount(count, 'run')}"))
         how = how.replace(only=sorted(number - 1 for number in runs))
         if action == "measure":
-            from rendergraph.compare.export.shards import measure
+            from rendergraph.compare.export.openjd import measure
 
             _report(measure(base, file.space, out, reference, how), out, len(runs), as_json=as_json)
         elif frames is None:
             raise UsageError(Problem("RG500", "farm frames needs --frames, such as --frames 1-24"))
         else:
-            from rendergraph.compare.export.shards import render_frames
+            from rendergraph.compare.export.openjd import render_frames
             from rendergraph.session.gpu import Gpu
 
             paths = []

@@ -10,7 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
 
@@ -35,34 +35,24 @@ Settings: TypeAlias = "tuple[tuple[str, str], ...]"
 """Paths with values, sorted: a key of a run."""
 
 
-@dataclass(frozen=True)
-class _Dimension:
-    """Axes that are zipped, as the optimiser sees them: one position, or one of several values."""
+def _distribution(axis: Axis) -> Any:
+    """Return a position 0…1 for a continuous range; neighbours are close in a list of ordered numbers alone."""
+    from optuna import distributions  # an extra
 
-    axes: tuple[Axis, ...]
+    if axis.span is not None:
+        return distributions.FloatDistribution(0.0, 1.0)
+    numbers = [typed(value) for value in axis.values]
+    is_number = all(isinstance(value, int | float) and not isinstance(value, bool) for value in numbers)
+    if is_number and numbers in (sorted(numbers), sorted(numbers, reverse=True)):
+        return distributions.IntDistribution(0, len(numbers) - 1)
+    return distributions.CategoricalDistribution(tuple(range(len(numbers))))
 
-    @property
-    def name(self) -> str:
-        return self.axes[0].path
 
-    def distribution(self) -> Any:
-        """Return a position 0…1 for a continuous range; neighbours are close in a list of ordered numbers alone."""
-        from optuna import distributions  # an extra
-
-        values = self.axes[0].values
-        if not values:
-            return distributions.FloatDistribution(0.0, 1.0)
-        numbers = [typed(value) for value in values]
-        is_number = all(isinstance(value, int | float) and not isinstance(value, bool) for value in numbers)
-        if is_number and numbers in (sorted(numbers), sorted(numbers, reverse=True)):
-            return distributions.IntDistribution(0, len(values) - 1)
-        return distributions.CategoricalDistribution(tuple(range(len(values))))
-
-    def settings(self, given: float) -> dict[str, str]:
-        if self.axes[0].span is None:
-            return {axis.path: axis.values[int(given)] for axis in self.axes}
-        position = (given, max(0.0, given - 1e-4), min(1.0, given + 1e-4))
-        return {axis.path: axis.at(position) for axis in self.axes}
+def _value(axis: Axis, given: float) -> str:
+    """Return the value that the optimiser gave as a position, or as a number of the list of values."""
+    if axis.span is None:
+        return axis.values[int(given)]
+    return axis.at((given, max(0.0, given - 1e-4), min(1.0, given + 1e-4)))
 
 
 class _Optimiser:
@@ -70,9 +60,9 @@ class _Optimiser:
         import optuna  # an extra
 
         self.objectives = objectives
-        self.asked: list[tuple[dict[str, str], Result | None]] = []
-        self._dimensions = [_Dimension(group) for group in space.groups]
-        self._distributions = {dimension.name: dimension.distribution() for dimension in self._dimensions}
+        self.asked: list[dict[str, str]] = []
+        self._groups = space.groups  # zipped axes are one dimension
+        self._distributions = {group[0].path: _distribution(group[0]) for group in self._groups}
         self._results: dict[Settings, Result | None] = {}
         with _silent():
             sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, constant_liar=True)
@@ -88,8 +78,8 @@ class _Optimiser:
         repeated = 0
         while len(trials) < count and repeated < MOST_REPEATED:
             trial = self._study.ask(self._distributions)
-            parts = [dimension.settings(trial.params[dimension.name]) for dimension in self._dimensions]
-            run = {path: value for part in parts for path, value in part.items()}
+            given = trial.params
+            run = {axis.path: _value(axis, given[group[0].path]) for group in self._groups for axis in group}
             key = _key(run)
             if key in self._results or key in trials:
                 repeated += 1
@@ -104,7 +94,7 @@ class _Optimiser:
         for trial, run in trials:
             result = by_settings.get(_key(run))
             self._results[_key(run)] = result
-            self.asked.append((run, result))
+            self.asked.append(run)
             self._tell(trial, result)
 
     def _tell(self, trial: Any, result: Result | None) -> None:
@@ -139,10 +129,7 @@ def search(
     optimiser = _Optimiser(space, objectives, options.seed)
     parts: list[Sweep] = []
     # A batch is one task: this process renders it, unless an executor was named. It stays open between batches.
-    with (
-        options.open_executor(1, travels=base.travels) as farm,
-        report_progress(options.progress, "runs") as report,
-    ):
+    with options.open_executor(1, travels=base.travels) as farm, report_progress(options.progress, "runs") as report:
 
         def render(runs: Sequence[Mapping[str, str]], *, resume: bool) -> Sweep:
             before = len(optimiser.asked)
@@ -160,7 +147,7 @@ def search(
                 break
             parts.append(render([run for _, run in trials], resume=options.resume or bool(parts)))
             optimiser.learn(trials, parts[-1].comparison.results)
-        runs = [run for run, _ in optimiser.asked]
+        runs = optimiser.asked
         whole = render(runs, resume=True)
     results = whole.comparison.results
     values = {result.name: own for result in results if (own := objective_values(result, objectives)) is not None}
@@ -180,18 +167,16 @@ def check_search(
 ) -> Prepared:
     """Check everything about a search that can be checked without GL, and return the runs at the ends of the axes."""
     space.check(spans=True)
-    problems = []
+    texts = []
     if reference is None:
-        text = "a search needs a reference to measure its runs against: --reference PIPELINE, or a picture"
-        problems.append(Problem("RG524", text))
+        texts.append("a search needs a reference to measure its runs against: --reference PIPELINE, or a picture")
     names = [*OBJECTIVES, *(added.name for added in base.resolve().catalog.extensions.metrics())]
     names += figures(base.link().graph)
     for name in minimise:
         if name not in names:
-            text = f"unknown objective '{name}'{suggestion(name, names)}; available: {', '.join(names)}"
-            problems.append(Problem("RG524", text))
-    if problems:
-        raise InputError(problems)
+            texts.append(f"unknown objective '{name}'{suggestion(name, names)}; available: {', '.join(names)}")
+    if texts:
+        raise InputError([Problem("RG524", text) for text in texts])
     return prepare(base, replace(space, chosen=tuple(_ends(space))), Path(), reference, SweepOptions(metric=metric))
 
 

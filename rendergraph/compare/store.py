@@ -181,7 +181,7 @@ class ResultsLog:
             raise self._failed(error) from error
 
     def _failed(self, error: OSError) -> RenderError:
-        return _write_error(self.path, "the results cannot be written", error)
+        return write_error(self.path, "the results cannot be written", error)
 
 
 def checksum(record: Mapping[str, Any]) -> str:
@@ -199,7 +199,7 @@ def _verified(text: bytes | str) -> dict[str, Any] | None:
     return record if isinstance(record, dict) and record.get(CHECKSUM) == checksum(record) else None
 
 
-def _write_error(path: Path, text: str, error: OSError) -> RenderError:
+def write_error(path: Path, text: str, error: OSError) -> RenderError:
     return RenderError(Problem("RG507", f"{text}: {error.strerror or error}", Place(str(path))))
 
 
@@ -207,7 +207,7 @@ def make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise _write_error(folder, "the folder cannot be created", error) from error
+        raise write_error(folder, "the folder cannot be created", error) from error
 
 
 def _write_json(path: Path, document: Mapping[str, Any]) -> None:
@@ -263,7 +263,7 @@ class SweepFolder:
             try:
                 run.picture.unlink(missing_ok=True)
             except OSError as error:
-                raise _write_error(run.picture, "the picture cannot be removed", error) from error
+                raise write_error(run.picture, "the picture cannot be removed", error) from error
 
     def append(self, record: Mapping[str, Any]) -> None:
         ResultsLog(self.path / RESULTS).append(record)

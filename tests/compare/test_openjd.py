@@ -18,8 +18,7 @@ from hypothesis import strategies as st
 import rendergraph as rg
 from rendergraph.cli.app import main
 from rendergraph.compare.engine import sweep
-from rendergraph.compare.export.openjd import numbers_text, parse_numbers, template
-from rendergraph.compare.export.shards import measure, render_frames
+from rendergraph.compare.export.openjd import measure, numbers_text, parse_numbers, render_frames, template
 from rendergraph.compare.prepare import SweepOptions, prepare
 from rendergraph.compare.runner import list_sweep
 from rendergraph.compare.store import ResultsLog

@@ -37,12 +37,7 @@ def figure(
 ) -> Figure:
     """Return a figure with a picture of each variant, magnified crops beneath, and the errors as titles.
 
-    Args:
-        comparison: the variants; a reference that is none of them comes first.
-        crops: parts of the picture: left, top, width and height in pixels, also by name.
-        caption: text beneath.
-        errors: whether a row of FLIP maps follows the pictures.
-        width: of the figure, in inches.
+    A reference that is none of the variants comes first. `Results.figure` describes the arguments.
 
     Raises:
         UsageError: Matplotlib is not installed.
@@ -60,9 +55,7 @@ def figure(
             raise InputError(Problem("RG500", text))
     reference = comparison.reference
     shown: list[tuple[str, Any, Result | None]] = [
-        (each.name, eight_bit(each.pixels, each.encoding), each)
-        for each in comparison.results
-        if each.pixels is not None
+        (one.name, eight_bit(one.pixels, one.encoding), one) for one in comparison.results if one.pixels is not None
     ]
     if reference.kind != "variant":
         shown.insert(0, (reference.name, eight_bit(reference.pixels, reference.encoding), None))
@@ -98,11 +91,9 @@ def figure(
 
 def latex_table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     """Return a table for LaTeX with the package booktabs; the first column is text, all others are numbers."""
-    lines = [" & ".join(_latex(str(cell)) for cell in row) + r" \\" for row in (heads, *rows)]
-    head, body, columns = lines[0], "\n".join(lines[1:]), "l" + "r" * (len(heads) - 1)
-    return "\n".join(
-        [f"\\begin{{tabular}}{{{columns}}}", "\\toprule", head, "\\midrule", body, "\\bottomrule", "\\end{tabular}\n"]
-    )
+    head, *body = [" & ".join(_latex(str(cell)) for cell in row) + r" \\" for row in (heads, *rows)]
+    begin = rf"\begin{{tabular}}{{l{'r' * (len(heads) - 1)}}}"
+    return "\n".join([begin, r"\toprule", head, r"\midrule", *body, r"\bottomrule", "\\end{tabular}\n"])
 
 
 def _latex(text: str) -> str:

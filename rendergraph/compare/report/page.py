@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from html import escape
 
 from rendergraph.compare.engine import Sweep
-from rendergraph.compare.report.html import card, drawing, milliseconds, number, section, software_note, table, template
-from rendergraph.compare.report.pictures import first_differences, sheet, signed_sheet, viewer
+from rendergraph.compare.report import html as blocks
+from rendergraph.compare.report.html import card, drawing, milliseconds, number, section, software_note, table
 from rendergraph.compare.report.scatter import Point, scatter_svg
 from rendergraph.compare.results import Comparison, Result, Search, machine, pareto
+from rendergraph.compare.timing import Times
 from rendergraph.diagrams import lifetimes_svg
 from rendergraph.diff import diff, diff_svg, diff_text
 from rendergraph.formatting import format_bytes
@@ -36,13 +38,13 @@ def comparison_page(comparison: Comparison, command: str, *, title: str = "", no
     names = [result.name for result in comparison.results]
     title = title or (f"{names[0]} against {', '.join(names[1:])}" if names[1:] else names[0])
     summary = _summary(comparison, front=())
-    pictures = section("pictures", "Pictures", viewer(comparison), sheet(comparison, MOST_COLUMNS))
+    pictures = section("pictures", "Pictures", blocks.viewer(comparison), blocks.sheet(comparison, MOST_COLUMNS))
     if all(result.memory for result in comparison.results):
         sections = [
             section("summary", "Summary", summary, software_note(comparison.software)),
             pictures,
             section("light", "Light against the truth", *_light(comparison)),
-            section("first", "First difference", first_differences(comparison)),
+            section("first", "First difference", blocks.first_differences(comparison)),
             section("times", "Times", *_times(comparison, comparison.results[:MOST_COLUMNS], ())),
             section("structure", "Structure", _structure(comparison)),
             section("memory", "Memory", _memory(comparison.results)),
@@ -71,7 +73,7 @@ def sweep_page(sweep: Sweep, command: str, *, title: str = "", note: str = "") -
         section("axes", "Axes", axes, saved),
         section("search", "Search", _search(sweep.search) if sweep.search else ""),
         section("summary", "Runs", _summary(comparison, front=front), failed, software_note(comparison.software)),
-        section("pictures", "Pictures", viewer(comparison), sheet(comparison, MOST_COLUMNS)),
+        section("pictures", "Pictures", blocks.viewer(comparison), blocks.sheet(comparison, MOST_COLUMNS)),
         section("light", "Light against the truth", *_light(comparison)),
         section("times", "Times", *_times(comparison, best, front), best_words),
         section("memory", "Memory", _memory(best)),
@@ -83,7 +85,7 @@ def notebook_html(comparison: Comparison) -> str:
     """Return the first pictures and the summary for a notebook, whose page has styles of its own."""
     results, (width, height) = comparison.results, comparison.size
     shown = [result for result in results if result.pixels is not None][:_MOST_NOTEBOOK_PICTURES]
-    pictures = sheet(replace(comparison, results=tuple(shown)), _MOST_NOTEBOOK_PICTURES)
+    pictures = blocks.sheet(replace(comparison, results=tuple(shown)), _MOST_NOTEBOOK_PICTURES)
     plain = replace(comparison, results=tuple(replace(result, pixels=None) for result in results))  # without buttons
     about = ", ".join(filter(None, (comparison.scene, f"{width}×{height}")))
     summary = f"{_summary(plain, ())}<p>{escape(about)}</p>{software_note(comparison.software)}"
@@ -126,15 +128,15 @@ def _page(title: str, note: str, comparison: Comparison, sections: Sequence[tupl
     links, bodies = (list(filter(None, column)) for column in zip(*sections, closing, strict=True))
     notes = [f'<p class="note">{escape(part.strip())}</p>\n' for part in note.split("\n\n") if part.strip()]
     # Nothing may be fetched: the page says so to the browser, which then holds it to that.
-    return template(
+    return blocks.template(
         "page.html",
         title=escape(title),
-        style=template("page.css"),
+        style=blocks.template("page.css"),
         lead=escape(" · ".join(fact for fact in facts if fact)),
         notes="".join(notes),
         links="".join(links),
         bodies="\n".join(bodies),
-        script=template("page.js"),
+        script=blocks.template("page.js"),
     )
 
 
@@ -142,55 +144,44 @@ def _page(title: str, note: str, comparison: Comparison, sections: Sequence[tupl
 
 
 def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
-    more = list(dict.fromkeys(name for result in comparison.results for name in result.columns))
-    measured = all(result.memory for result in comparison.results)
-    whole = any(result.times.frame_ms for result in comparison.results)
-    light = any(result.radiance_rmse is not None for result in comparison.results)
-    heads = ["", "#FLIP", "#RMSE", "#PSNR dB", "#SSIM", *(f"#{escape(name)}" for name in more)]
-    heads += ["#light RMSE", "#rel. MSE"] if light else []
-    again = measured and any(result.times.repeated for result in comparison.results)
+    results, reference = comparison.results, comparison.reference
+    measured = all(result.memory for result in results)
+    again = measured and any(result.times.repeated for result in results)
+    most = max(result.times.headline.median for result in results)
+    columns: list[tuple[str, Callable[[Result], str]]] = [
+        ("FLIP", lambda r: _cell(number(r.metrics.flip))),
+        ("RMSE", lambda r: _cell(number(r.metrics.rmse))),
+        ("PSNR dB", lambda r: _cell("∞" if r.metrics.psnr is None else number(r.metrics.psnr, 2))),
+        ("SSIM", lambda r: _cell(number(r.metrics.ssim))),
+    ]
+    for name in dict.fromkeys(name for result in results for name in result.columns):
+        columns.append((escape(name), partial(lambda name, r: _cell(number(r.columns.get(name))), name)))
+    if any(result.radiance_rmse is not None for result in results):
+        columns.append(("light RMSE", lambda r: _cell(number(r.radiance_rmse))))
+        columns.append(("rel. MSE", lambda r: _cell(number(r.relative_mse))))
     if measured:
-        times_heads = ["#GPU ms", *(["#repeats"] if again else []), "#CPU ms", *(["#frame ms"] if whole else [])]
-        heads += [*times_heads, "#passes", "#textures"]
-    heads.append("")
-    most = max(result.times.headline.median for result in comparison.results)
+        columns.append(("GPU ms", lambda r: milliseconds(r.times.gpu_ms, most)))
+        if again:
+            columns.append(("repeats", lambda r: _cell(_repeats(r.times))))
+        columns.append(("CPU ms", lambda r: milliseconds(r.times.cpu_ms)))
+        if any(result.times.frame_ms for result in results):
+            columns.append(("frame ms", lambda r: milliseconds(r.times.frame_ms)))
+        columns.append(("passes", lambda r: _cell(str(r.pass_count))))
+        columns.append(("textures", lambda r: _cell(format_bytes(r.allocated_bytes))))
     names = {result.name for result in front}
     rows = []
-    for place, result in enumerate(comparison.results):
-        m, times = result.metrics, result.times
-        kinds = []
-        if comparison.reference.kind == "variant" and result.name == comparison.reference.name:
-            kinds.append("reference")
-        if result.name in names:
-            kinds.append("best")
+    for place, result in enumerate(results):
+        is_reference = reference.kind == "variant" and result.name == reference.name
+        kinds = ["reference"] * is_reference + ["best"] * (result.name in names)
         last = "Pareto front" if result.name in names else ""
         if result.pixels is not None:
             last += f' <button type="button" data-compare="pic-{place}">view</button>'
-        cells = [
-            f'<th scope="row">{escape(result.name.replace(",", ", "))}</th>',
-            *(_cell(number(value)) for value in (m.flip, m.rmse)),
-            _cell("∞" if m.psnr is None else number(m.psnr, 2)),
-            _cell(number(m.ssim)),
-            *(_cell(number(result.columns.get(name))) for name in more),
-        ]
-        cells += [_cell(number(result.radiance_rmse)), _cell(number(result.relative_mse))] if light else []
-        if measured:
-            cells += [milliseconds(times.gpu_ms, most if times.gpu_ms else 0)]
-            if again:
-                medians = times.repeated
-                span = f"{number(medians.min, 2)}–{number(medians.max, 2)}" if medians else "–"
-                cells.append(_cell(f"{span} ({len(times.repeats)})" if medians else span))
-            cells += [milliseconds(times.cpu_ms)]
-            cells += [milliseconds(times.frame_ms)] if whole else []
-            cells += [_cell(str(result.pass_count)), _cell(format_bytes(result.allocated_bytes))]
-        rows.append(f'<tr class="{" ".join(kinds)}">{"".join(cells)}<td>{last}</td></tr>')
-    reference = comparison.reference
+        cells = f'<th scope="row">{escape(result.name.replace(",", ", "))}</th>'
+        cells += "".join(cell(result) for _, cell in columns)
+        rows.append(f'<tr class="{" ".join(kinds)}">{cells}<td>{last}</td></tr>')
     of = {"display": "display-referred ", "linear": "scene-linear "}.get(reference.encoding, "")
-    named = (
-        f"port <code>{escape(comparison.metric)}</code>"
-        if comparison.metric
-        else f"output <code>{reference.output}</code>"
-    )
+    kind, name = ("port", escape(comparison.metric)) if comparison.metric else ("output", reference.output)
+    named = f"{kind} <code>{name}</code>"
     what = f"the {of}{named} of frame {comparison.frame}" if measured else f"{of}pictures"
     words = f"Errors of {what} against <code>{escape(reference.name)}</code>."
     if measured:
@@ -198,7 +189,13 @@ def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
         many = f"medians of {frames} frames, with the 10th to 90th percentile beneath"
         words += f" Times are {many if frames > 1 else 'of one frame'}."
         words += " Repeats are the least and greatest median of several measurements." if again else ""
+    heads = ["", *(f"#{name}" for name, _ in columns), ""]
     return table(heads, rows, "Errors, times and memory") + f"<p class=quiet>{words}</p>"
+
+
+def _repeats(times: Times) -> str:
+    medians = times.repeated
+    return f"{number(medians.min, 2)}–{number(medians.max, 2)} ({len(times.repeats)})" if medians else "–"
 
 
 def _cell(text: str) -> str:
@@ -264,7 +261,7 @@ def _light(comparison: Comparison) -> tuple[str, str, str]:
         f"<code>{escape(reference.name)}</code>. Their own noise adds {number(reference.noise)} to each relative mean "
         f"square error{part}. As much noise again changes the picture by a FLIP of {number(reference.flip_noise)}.</p>"
     )
-    return noise, signed_sheet(comparison, MOST_COLUMNS), _error_by(comparison)
+    return noise, blocks.signed_sheet(comparison, MOST_COLUMNS), _error_by(comparison)
 
 
 def _error_by(comparison: Comparison) -> str:
