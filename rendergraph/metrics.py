@@ -98,8 +98,7 @@ def measure(
 def same(pixels: Pixels, plugins: Sequence[Added[Metric]] = ()) -> Metrics:
     """Return the metrics of a picture against itself; those of plugins are computed."""
     own = colors(pixels)
-    more = {metric.name: _figure(metric, own, own, ("a picture", "itself")) for metric in plugins}
-    return replace(SAME, plugins=more)
+    return replace(SAME, plugins={one.name: _figure(one, own, own, ("a picture", "itself")) for one in plugins})
 
 
 def _figure(metric: Added[Metric], a: Floats, b: Floats, names: tuple[str, str]) -> float:
@@ -236,15 +235,14 @@ def flip(a: Pixels, b: Pixels, *, encoding: Encoding = "display") -> npt.NDArray
     hdr = encoding == "linear" and bool(np.any(np.nan_to_num(b) > 0))
     if np.array_equal(a, b) and np.isfinite(a).all():
         return np.zeros(a.shape[:2], np.float32)
-    linear = [
-        np.ascontiguousarray(from_srgb(x) if encoding != "linear" else x if hdr else np.clip(x, 0, 1), np.float32)
-        for x in (a, b)
-    ]
-    linear = [np.nan_to_num(x, nan=0.0, posinf=65504.0, neginf=0.0) for x in linear]
-    test, reference = (oiio.ImageBuf(x) for x in linear)
-    result = oiio.ImageBufAlgo.FLIP_diff(
-        reference, test, hdr=int(hdr), maxluminance=0.0 if hdr else 2.0, ppd=PIXELS_PER_DEGREE
-    )
+    if encoding != "linear":
+        a, b = from_srgb(a), from_srgb(b)
+    elif not hdr:
+        a, b = np.clip(a, 0, 1), np.clip(b, 0, 1)
+    single = (np.ascontiguousarray(x, np.float32) for x in (a, b))
+    test, reference = (oiio.ImageBuf(np.nan_to_num(x, nan=0.0, posinf=65504.0, neginf=0.0)) for x in single)
+    most = 0.0 if hdr else 2.0
+    result = oiio.ImageBufAlgo.FLIP_diff(reference, test, hdr=int(hdr), maxluminance=most, ppd=PIXELS_PER_DEGREE)
     if result.has_error:
         raise RuntimeError(f"FLIP cannot be computed: {result.geterror()}")
     return np.asarray(result.get_pixels(oiio.FLOAT), np.float32)[..., 0]

@@ -146,10 +146,8 @@ def compare(
     ):
         farm.upload_inputs(lambda: make_bundle(files, given[0].selection.plugins, prepared.modules))
         runner.execute(farm, report)
-    runs = [*prepared.runs, *(run for run in (prepared.other, prepared.truth) if run is not None)]
-    return runner.comparison(
-        warnings=[problem for run in runs for problem in run.planned.linked.catalog.extensions.warnings]
-    )
+    catalogs = [run.planned.linked.catalog for run in (*prepared.runs, *prepared.references)]
+    return runner.comparison(warnings=[problem for catalog in catalogs for problem in catalog.extensions.warnings])
 
 
 def sweep(
@@ -203,7 +201,7 @@ def sweep(
         missing = runner.missing
         resumed, timed = len(runs) - len(missing), sum(number in runner.results for number in missing)
         redrawn = sum((runs[n].folder / RUN).exists() for n in missing if n not in runner.results)
-        if missing or prepared.other or prepared.truth:
+        if missing or prepared.references:
             with (
                 options.open_executor(-(-len(missing) // MOST_RUNS), travels=base.travels) as farm,
                 report_progress(options.progress, "runs") as report,

@@ -228,13 +228,17 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Twin:
-    """A run of a comparison with the twin of one of its nodes in that node's place."""
+    """A run of a comparison with the twin of one of its nodes in that node's place, and the error of its light.
+
+    The error is NaN before it has been rendered, and if it cannot be.
+    """
 
     number: int
     node: str
     type: str
     twin: str
     run: Run
+    relative_mse: float = math.nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,9 +271,13 @@ class Prepared:
         return self.other or self.runs[0]
 
     @property
+    def references(self) -> list[Run]:
+        """The reference, if it is a pipeline of its own."""
+        return [run for run in (self.other, self.truth) if run is not None]
+
+    @property
     def modules(self) -> set[str]:
-        others = [run for run in (self.other, self.truth, *(twin.run for twin in self.twins)) if run is not None]
-        runs = [*self.runs, *others]
+        runs = [*self.runs, *self.references, *(twin.run for twin in self.twins)]
         return {type(node.node).__module__ for run in runs for node in run.planned.linked.graph.nodes}
 
 

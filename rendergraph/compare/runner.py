@@ -7,12 +7,12 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from rendergraph.compare import store, tasks
 from rendergraph.compare.batches import MOST_RUNS, Batch, batches, group_similar
 from rendergraph.compare.fingerprint import run_key
-from rendergraph.compare.prepare import Prepared, Run, SweepOptions
+from rendergraph.compare.prepare import Prepared, Run, SweepOptions, Twin
 from rendergraph.compare.results import (
     Comparison,
     Reference,
@@ -24,7 +24,7 @@ from rendergraph.compare.results import (
     smallest_error,
     typed_settings,
 )
-from rendergraph.compare.truth import TruthProgress, TruthTask, TwinResult, TwinTask, noise_note, representatives
+from rendergraph.compare.truth import TruthProgress, TruthTask, TwinTask, noise_note, representatives
 from rendergraph.errors import Problem, RendergraphError
 from rendergraph.farm import Executor, Handle, TaskFailed, TaskFinished, TaskOutput, TaskRetried
 from rendergraph.session.progress import report_progress
@@ -42,7 +42,7 @@ class Runner:
         self.reference: Reference | None = prepared.picture
         self.device: Mapping[str, object] = {}
         self.warnings: list[Problem] = []
-        self.twins: dict[int, list[TwinResult]] = {}
+        self.twins: dict[int, list[Twin]] = {}
         self._handle: Handle | None = None
         self._waiting: list[list[int]] = []
         self._outputs = 0
@@ -58,9 +58,8 @@ class Runner:
         if self.reference is not None:
             self._distribute(farm, self.reference)
         elif self.prepared.other is not None or 0 in self.results:
-            kind: Literal["variant", "pipeline"] = "variant" if self.prepared.other is None else "pipeline"
             base = self.prepared.base.for_task()
-            farm.submit(tasks.ReferenceTask(base.name, base, kind, self.prepared.encoding, self.options.frame))
+            farm.submit(tasks.ReferenceTask(base.name, base, self.prepared.encoding))
         elif self._waiting:
             first = self._waiting.pop(0)
             if farm.workers > 1 and len(first) > 1:  # all others wait for the first run
@@ -127,7 +126,7 @@ class Runner:
         for one in self.twins.get(number, ()):
             left = one.relative_mse if math.isfinite(one.relative_mse) else None
             reduction = 1 - left / result.relative_mse if left is not None and result.relative_mse else None
-            errors.append(TwinError(one.twin.node, one.twin.type, one.twin.twin, left, reduction))
+            errors.append(TwinError(one.node, one.type, one.twin, left, reduction))
         errors.sort(key=lambda error: math.inf if error.relative_mse is None else error.relative_mse)
         return replace(result, error_by=tuple(errors))
 
@@ -151,7 +150,7 @@ class Runner:
             "needs": (self._handle,) if self._handle else (),
             "runs": tuple(runs[n].for_task(is_rendered=n in self.results) for n in numbers),
             "encoding": self.prepared.encoding,
-            **{name: getattr(options, name) for name in ("frame", "frames", "repeats", "most_bytes")},
+            **{name: getattr(options, name) for name in ("frames", "repeats", "most_bytes")},
         }
 
     def _distribute(self, farm: Executor, reference: Reference) -> None:
@@ -178,8 +177,8 @@ class Runner:
                 self._rendered(output)
         elif isinstance(output, tasks.TimingResult):
             self._timed(output, worker)
-        elif isinstance(output, TwinResult):
-            self.twins.setdefault(output.twin.number, []).append(output)
+        elif isinstance(output, Twin):
+            self.twins.setdefault(output.number, []).append(output)
 
     def _rendered(self, output: tasks.RenderedResult) -> None:
         run = self.prepared.runs[output.number]
@@ -191,8 +190,7 @@ class Runner:
 
     def _task_event(self, farm: Executor, event: TaskFinished | TaskRetried | TaskFailed) -> None:
         if isinstance(event, TaskFailed) and isinstance(event.task, TwinTask):
-            twin = event.task.twin
-            self.twins.setdefault(twin.number, []).append(TwinResult(twin, math.nan))
+            self.twins.setdefault(event.task.twin.number, []).append(event.task.twin)
             self.warnings += [problem.as_warning() for problem in event.problems]
         elif isinstance(event, TaskFailed):
             raise type(event.error)(event.error.problems) from event.error
@@ -279,9 +277,7 @@ class SweepRunner(Runner):
             return set()
         rendered = {n: own for n, own in self.results.items() if own.times.frames and own.pixels is not None}
         kept = set(pareto_front({n: objective_values(own, self.options.best) for n, own in rendered.items()}))
-        if (self.prepared.other or self.prepared.truth) is None and (
-            self.reference is None or self.reference.kind == "variant"
-        ):
+        if not self.prepared.references and (self.reference is None or self.reference.kind == "variant"):
             kept.add(0)
         return set(rendered) - kept
 
@@ -325,17 +321,8 @@ class SweepRunner(Runner):
             return
         seconds, left, total = time.monotonic() - self._begun, len(self.missing), len(self.prepared.runs)
         rate = self._completed / seconds if seconds > 0 else 0.0
-        self.options.events(
-            {
-                "event": event,
-                "worker": worker,
-                **more,
-                "done": total - left,
-                "of": total,
-                "runs_per_second": round(rate, 3),
-                "seconds_left": round(left / rate, 1) if rate else None,
-            }
-        )
+        speed = {"runs_per_second": round(rate, 3), "seconds_left": round(left / rate, 1) if rate else None}
+        self.options.events({"event": event, "worker": worker, **more, "done": total - left, "of": total, **speed})
 
 
 def _reason(problems: Sequence[Problem]) -> str:
@@ -356,14 +343,12 @@ class Listing:
 
     def shared(self) -> dict[str, tuple[int, int]]:
         """Return how often each pass would run, with and without sharing, in order of execution."""
-        shared: dict[str, set[tuple[int, str]]] = {}
-        alone: dict[str, int] = {}
+        drawn: dict[str, list[tuple[int, str]]] = {}
         for at, group in enumerate(self.groups):
-            for place, number in enumerate(group.numbers):
+            for number, names in zip(group.numbers, group.names, strict=True):
                 for name in passes(self.prepared.runs[number].planned.plan):
-                    shared.setdefault(name, set()).add((at, group.names[place][name]))
-                    alone[name] = alone.get(name, 0) + 1
-        return {name: (len(different), alone[name]) for name, different in shared.items()}
+                    drawn.setdefault(name, []).append((at, names[name]))
+        return {name: (len(set(each)), len(each)) for name, each in drawn.items()}
 
     def group_of(self) -> dict[int, int]:
         return {number: at for at, group in enumerate(self.groups, 1) for number in group.numbers}
@@ -400,12 +385,12 @@ class Listing:
 
 def list_sweep(prepared: Prepared, out: Path | None = None, options: SweepOptions = SweepOptions()) -> Listing:
     """Return what `sweep` would render into a folder; without one, no run is complete."""
-    numbers, kept = range(len(prepared.runs)), frozenset[int]()
+    kept = frozenset[int]()
     if out is not None:
         store.check_folder(out, prepared.study, resume=options.resume)
         lines, _ = store.ResultsLog(out / store.RESULTS).by_key()
-        kept = frozenset(number for number in numbers if is_complete(prepared.runs[number], lines, options))
-    waiting = [number for number in numbers if number not in kept]
+        kept = frozenset(number for number, run in enumerate(prepared.runs) if is_complete(run, lines, options))
+    waiting = [number for number in range(len(prepared.runs)) if number not in kept]
     groups = batches([run.planned for run in prepared.runs], waiting, options.most_bytes)
     return Listing(prepared, kept, tuple(groups))
 

@@ -137,11 +137,11 @@ class Space:
         """
         if isinstance(axes, Space):
             return axes
+        given = [axes] if isinstance(axes, str) else axes
         try:
-            if isinstance(axes, Mapping):
-                made = [_from_python(path, values) for path, values in axes.items()]
+            if isinstance(given, Mapping):
+                made = [_from_python(path, values) for path, values in given.items()]
             else:
-                given = [axes] if isinstance(axes, str) else axes
                 made = [axis if isinstance(axis, Axis) else parse_axis(axis) for axis in given]
         except ValueError as error:
             raise InputError(Problem("RG524", str(error))) from None
@@ -354,9 +354,8 @@ def repeated(values: Iterable[str]) -> list[str]:
 def _from_python(path: str, values: Iterable[Any] | str) -> Axis:
     if isinstance(values, str):
         return axis_of(path, values)
-    if not isinstance(values, Iterable):
-        values = [values]
-    return Axis(path, tuple(value if isinstance(value, str) else json.dumps(value) for value in values))
+    listed = values if isinstance(values, Iterable) else [values]
+    return Axis(path, tuple(value if isinstance(value, str) else json.dumps(value) for value in listed))
 
 
 # --- runs ------------------------------------------------------------------------------------------------------------

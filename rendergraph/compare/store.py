@@ -295,13 +295,10 @@ def find_record(run: Run, lines: Mapping[str, dict[str, Any]], *, pictures: bool
     known = {name: value for name, value in document.items() if name in RunRecord.__struct_fields__}
     try:
         record = msgspec.convert(known, RunRecord)
-    except msgspec.ValidationError:
-        return None
-    if record.picture is None:
-        return None if pictures else record
-    try:
+        if record.picture is None:
+            return None if pictures else record
         unchanged = hashlib.sha256(run.picture.read_bytes()).hexdigest() == record.picture_sha256
-    except OSError:
+    except (msgspec.ValidationError, OSError):
         return None
     return record if unchanged else None
 
@@ -362,14 +359,13 @@ def check_folder(out: Path, study: Mapping[str, Any], *, resume: bool) -> None:
     before = _read_study(out)
     if before is None or not (differing := [key for key in study if before.get(key) != study[key]]):
         return
-    named = [f"{key} {before.get(key)}, not {study[key]}" for key in differing if key != _VALUES]
-    changed = f"other values (-s, -p or the file): {_first_change(before[_VALUES], study[_VALUES])}"
-    what = "; ".join(named) or changed
+    what = "; ".join(f"{key} {before.get(key)}, not {study[key]}" for key in differing if key != _VALUES)
+    what = what or f"other values (-s, -p or the file): {_first_change(before[_VALUES], study[_VALUES])}"
     raise _refused(out, f"it has results of another study: {what}; use another folder: -o {out}-2")
 
 
 def kept_runs(out: Path) -> int:
-    return sum(1 for _ in out.glob(f"*/{RUN}"))
+    return len(list(out.glob(f"*/{RUN}")))
 
 
 def _first_change(old: Any, new: Any, path: str = "") -> str:

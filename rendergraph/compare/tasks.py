@@ -92,7 +92,6 @@ class VariantTask(Task):
     needs: tuple[Handle, ...]
     runs: tuple[Run, ...]
     encoding: Encoding
-    frame: int
     frames: int
     repeats: int
     most_bytes: int
@@ -139,7 +138,7 @@ class VariantTask(Task):
     ) -> Iterator[TaskEvent]:
         planned = [each for _, each in runs]
         unrendered = [place for place in batch.numbers if not runs[place][0].is_rendered]
-        for place, arrays in list(render_batch(worker.gpu, batch, self.frame)) if unrendered else ():
+        for place, arrays in list(render_batch(worker.gpu, batch, self.runs[0].frame)) if unrendered else ():
             if place not in unrendered:
                 continue
             run, own = runs[place]
@@ -165,7 +164,7 @@ class ComparisonTask(VariantTask):
         reference = self.reference(worker)
         for run, each in zip(self.runs, planned, strict=True):
             lit = with_light(each, run.light)  # measured without: another output needs memory
-            frame = stages.draw_last(lit.for_frames(range(1, self.frame + 1)), worker.gpu)
+            frame = stages.draw_last(lit.for_frames(range(1, run.frame + 1)), worker.gpu)
             if reference is None:
                 reference = _reference(run, frame.arrays, self.encoding)
                 yield ReferenceResult(reference, origin_of(worker))
@@ -175,15 +174,14 @@ class ComparisonTask(VariantTask):
             yield TimingResult(run.number, times_of(times, node_types(each)), origin_of(worker))
 
     def _difference(self, run: Run, planned: Planned, worker: Worker) -> dict[str, Any]:
-        graph, key = planned.linked.graph, ("outputs", self.base.digest, self.frame)
+        graph, key = planned.linked.graph, ("outputs", self.base.digest, run.frame)
         if run.number == self.base.number:
             return {"difference": diff(graph, graph)}
         if key not in worker.cache:
             base = self.base.plan(worker)
-            worker.cache[key] = base.linked.graph, every_output(worker.gpu, base, self.frame)
+            worker.cache[key] = base.linked.graph, every_output(worker.gpu, base, run.frame)
         base_graph, base_frame = worker.cache[key]
-        difference = diff(base_graph, graph)
-        frame = every_output(worker.gpu, planned, self.frame)
+        difference, frame = diff(base_graph, graph), every_output(worker.gpu, planned, run.frame)
         first = first_difference(base_frame, frame, planned.plan, graph, difference)
         return {"difference": difference, "first": first}
 
@@ -192,19 +190,16 @@ class ComparisonTask(VariantTask):
 class ReferenceTask(Task):
     name: str
     base: Run
-    kind: Literal["variant", "pipeline"]
     encoding: Encoding
-    frame: int
 
     def run(self, worker: Worker) -> Iterator[ReferenceResult]:
-        planned = self.base.plan(worker)
-        frame = stages.draw_last(planned.for_frames(range(1, self.frame + 1)), worker.gpu)
-        yield ReferenceResult(_reference(self.base, frame.arrays, self.encoding, self.kind), origin_of(worker))
+        planned = self.base.plan(worker).for_frames(range(1, self.base.frame + 1))
+        arrays = stages.draw_last(planned, worker.gpu).arrays
+        yield ReferenceResult(_reference(self.base, arrays, self.encoding), origin_of(worker))
 
 
-def _reference(
-    run: Run, arrays: Mapping[str, Pixels], encoding: Encoding, kind: Literal["variant", "pipeline"] = "variant"
-) -> Reference:
+def _reference(run: Run, arrays: Mapping[str, Pixels], encoding: Encoding) -> Reference:
+    kind: Literal["variant", "pipeline"] = "variant" if run.number >= 0 else "pipeline"
     return Reference(run.name, kind, _one_picture(arrays[run.output]), encoding, run.output, arrays.get("radiance"))
 
 
@@ -273,15 +268,15 @@ def every_output(gpu: Gpu, planned: Planned, frame: int) -> Frame:
 
 def taps(graph: Graph, plan: ResourcePlan) -> list[str]:
     """Return the ports, in order of execution, whose texture another node or an output of the graph reads."""
-    read = {Endpoint(end.node, end.port) for node in graph.nodes for ends in node.inputs.values() for end in ends}
+    read = {end.now for node in graph.nodes for ends in node.inputs.values() for end in ends}
     read |= set(graph.outputs.values())
     ports = []
     for node in passes(plan):
         for name, port in graph[node].node.outputs().items():
-            info = graph.textures.get(Endpoint(node, name))
-            desc = info.desc if info is not None else None
+            end = Endpoint(node, name)
+            desc = graph.textures[end].desc if end in read and end in graph.textures else None
             if isinstance(port, Output | InOut) and desc is not None and desc.layers and desc.samples == 1:
-                ports += [f"{node}.{name}"] if Endpoint(node, name) in read else []
+                ports.append(str(end))
     return ports
 
 

@@ -113,16 +113,9 @@ def step_times(frames: Sequence[FrameTimes]) -> list[dict[str, Any]]:
     for frame in frames:
         for step in frame.steps:
             costs.setdefault((step.node, step.index, step.label), []).append((step.cpu_ms, step.gpu_ms))
-    return [
-        {
-            "node": node,
-            "step": index,
-            "label": label,
-            "gpu_ms": to_builtins(_gpu(values)),
-            "cpu_ms": to_builtins(_cpu(values)),
-        }
-        for (node, index, label), values in costs.items()
-    ]
+    keys = ("node", "step", "label", "gpu_ms", "cpu_ms")
+    rows = ((*step, to_builtins(_gpu(values)), to_builtins(_cpu(values))) for step, values in costs.items())
+    return [dict(zip(keys, row, strict=True)) for row in rows]
 
 
 def _total(costs: Iterable[Cost]) -> Cost:

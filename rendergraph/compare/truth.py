@@ -15,7 +15,7 @@ import math
 import os
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -128,24 +128,16 @@ class TruthTask(Task):
         yield ReferenceResult(reference, origin_of(worker))
 
 
-@dataclass(frozen=True, eq=False)
-class TwinResult:
-    """The error of a run's light with the twin in place of one of its techniques; NaN if it cannot be rendered."""
-
-    twin: Twin
-    relative_mse: float
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TwinTask(Task):
     name: str
     needs: tuple[Handle, ...]
     twin: Twin
 
-    def run(self, worker: Worker) -> Iterator[TwinResult]:
+    def run(self, worker: Worker) -> Iterator[Twin]:
         reference, run = worker.value(self.needs[0]), self.twin.run
         light = _light(worker.gpu, run.plan(worker), run, frames=TWIN_FRAMES)
-        yield TwinResult(self.twin, relative_mse(light, reference.light))
+        yield replace(self.twin, relative_mse=relative_mse(light, reference.light))
 
 
 def representatives(runs: Sequence[Run]) -> tuple[Run, ...]:
