@@ -228,10 +228,7 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Twin:
-    """A run of a comparison with the twin of one of its nodes in that node's place, and the error of its light.
-
-    The error is NaN before it has been rendered, and if it cannot be.
-    """
+    """A run with the twin of one of its nodes in that node's place; the error of its light is NaN until it is known."""
 
     number: int
     node: str

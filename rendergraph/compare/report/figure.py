@@ -68,9 +68,9 @@ def figure(
         if errors:
             rows.append(heat_map(result.flip_map) if result is not None and result.flip_map is not None else None)
         rows += [pixels[y : y + h, x : x + w] for _, (x, y, w, h) in named]
-        measured = result is not None and not (reference.kind == "variant" and result.name == reference.name)
-        title = f"{name}\nFLIP {result.metrics.flip:.4f}" if measured and result is not None else f"{name}\nreference"
-        axes[0, column].set_title(title, fontsize=7)
+        measured = result is not None and not (reference.kind == "variant" and name == reference.name)
+        about = f"FLIP {result.metrics.flip:.4f}" if measured and result is not None else "reference"
+        axes[0, column].set_title(f"{name}\n{about}", fontsize=7)
         for row, picture in enumerate(rows):
             axis = axes[row, column]
             axis.set(xticks=[], yticks=[])

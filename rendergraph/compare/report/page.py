@@ -30,11 +30,7 @@ _NOTEBOOK_STYLE = """
 
 
 def comparison_page(comparison: Comparison, command: str, *, title: str = "", note: str = "") -> str:
-    """Return the report of `compare`; `command` repeats it.
-
-    The title is the names of the variants by default; the note is a text beneath it, whose empty lines separate
-    paragraphs.
-    """
+    """Return the report of `compare`; `command` repeats it, `note` is a text whose empty lines separate paragraphs."""
     names = [result.name for result in comparison.results]
     title = title or (f"{names[0]} against {', '.join(names[1:])}" if names[1:] else names[0])
     summary = _summary(comparison, front=())
@@ -93,12 +89,10 @@ def notebook_html(comparison: Comparison) -> str:
 
 
 def _search(search: Search) -> str:
-    rows = [
-        f'<tr><th scope="row">{escape(name.replace(",", ", "))}</th>'
-        + "".join(_cell(_value(value)) for value in search.values[name])
-        + "</tr>"
-        for name in search.front
-    ]
+    rows = []
+    for name in search.front:
+        cells = "".join(_cell(_value(value)) for value in search.values[name])
+        rows.append(f'<tr><th scope="row">{escape(name.replace(",", ", "))}</th>{cells}</tr>')
     what = " and ".join(f"<code>{escape(name)}</code>" for name in search.minimise)
     one = len(search.minimise) == 1
     words = f"{'The least' if one else 'The front of the least'} {what} of {len(search.order)} runs."
@@ -207,11 +201,9 @@ def _passes(results: Sequence[Result]) -> str:
     for result in results:  # each pipeline's own order, later ones fitted into the first's
         at = 0
         for entry in result.times.passes:
-            if entry.node in order:
-                at = order.index(entry.node) + 1
-            else:
+            if entry.node not in order:
                 order.insert(at, entry.node)
-                at += 1
+            at = order.index(entry.node) + 1
     timed = all(entry.gpu_ms for result in results for entry in result.times.passes)
     found = {(r.name, p.node): (p.gpu_ms if timed else p.cpu_ms) for r in results for p in r.times.passes}
     most = max((spread.median for spread in found.values() if spread), default=0.0)
@@ -296,34 +288,32 @@ def _structure(comparison: Comparison) -> str:
         title = f"{name} → {result.name}"
         if not difference:
             parts.append(f"<p>{escape(title)}: no difference.</p>")
-        else:
-            lines = [line.removeprefix("  ") for line in diff_text(difference).splitlines()[1:]]
-            changes = f"{len(lines)} change{'s' if len(lines) > 1 else ''}"
-            picture = drawing(diff_svg(graph, result.graph, difference), title)
-            parts.append(_folded(f"{title}: {changes}", f"<pre>{escape(chr(10).join(lines))}</pre>{picture}"))
+            continue
+        lines = [line.removeprefix("  ") for line in diff_text(difference).splitlines()[1:]]
+        changes = f"{len(lines)} change{'s' if len(lines) > 1 else ''}"
+        picture = drawing(diff_svg(graph, result.graph, difference), title)
+        parts.append(_folded(f"{title}: {changes}", f"<pre>{escape(chr(10).join(lines))}</pre>{picture}"))
     return "\n".join(parts)
 
 
 def _memory(results: Sequence[Result]) -> str:
     parts = []
     for result in results:
-        if result.plan is None:
-            continue
-        allocated = format_bytes(result.allocated_bytes)
-        svg = drawing(lifetimes_svg(result.plan), f"Lifetimes of the textures of {result.name}")
-        parts.append(_folded(f"{result.name}, {allocated}", svg))
+        if result.plan is not None:
+            svg = drawing(lifetimes_svg(result.plan), f"Lifetimes of the textures of {result.name}")
+            parts.append(_folded(f"{result.name}, {format_bytes(result.allocated_bytes)}", svg))
     return "\n".join(parts)
 
 
 def _machine(comparison: Comparison) -> str:
-    device = comparison.device
-    entries: list[tuple[str, object]] = [(key, value) for key, value in device.items() if not isinstance(value, dict)]
-    entries += list(machine().items())
+    device = {key: value for key, value in comparison.device.items() if not isinstance(value, dict)}
     flip, ssim = description()["flip"], description()["ssim"]
-    entries.append(("FLIP", f"{flip['library']}, {flip['pixels_per_degree']} pixels per degree"))
-    entries.append(("SSIM", f"{ssim['window']}×{ssim['window']} Gaussian, σ {ssim['sigma']}"))
-    entries.append(("made", datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")))
-    return card(entries)
+    made = {
+        "FLIP": f"{flip['library']}, {flip['pixels_per_degree']} pixels per degree",
+        "SSIM": f"{ssim['window']}×{ssim['window']} Gaussian, σ {ssim['sigma']}",
+        "made": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+    }
+    return card([*device.items(), *machine().items(), *made.items()])
 
 
 def _folded(title: str, body: str) -> str:

@@ -51,14 +51,11 @@ def scatter_svg(points: Sequence[Point], time: str, error: str) -> str:
         parts.append(_tick(x(right * part / 5), HEIGHT - BOTTOM, _plain(right * part / 5), upright=True))
         parts.append(_tick(LEFT, y(up * part / 5), _plain(up * part / 5), upright=False))
     middle = (TOP + HEIGHT - BOTTOM) / 2
-    parts.append(
-        f'<text class="fact" x="{(LEFT + WIDTH - RIGHT) / 2:.0f}" y="{HEIGHT - 10:.0f}" text-anchor="middle">'
-        f"{escape(time)}</text>"
-    )
-    parts.append(
-        f'<text class="fact" transform="translate(18 {middle:.0f}) rotate(-90)" text-anchor="middle">'
-        f"{escape(error)}</text>"
-    )
+    for where, title in (
+        (f'x="{(LEFT + WIDTH - RIGHT) / 2:.0f}" y="{HEIGHT - 10:.0f}"', time),
+        (f'transform="translate(18 {middle:.0f}) rotate(-90)"', error),
+    ):
+        parts.append(f'<text class="fact" {where} text-anchor="middle">{escape(title)}</text>')
     front = sorted((p for p in points if p.best), key=lambda p: p.ms)
     if len(front) > 1:
         path = f"M{x(front[0].ms):.1f} {y(front[0].error):.1f}"
