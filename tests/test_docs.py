@@ -92,13 +92,17 @@ def test_a_command_in_the_text_is_one(page: Path, command: str) -> None:
 LONG_PAGES = {
     "compare",
     "compute-node",
+    "continuous-integration",
     "forward-prepass",
+    "geometry-node",
     "gpu-data",
+    "ground",
     "hybrid",
     "laptop-to-cluster",
     "light-parts",
     "own-data",
     "path-traced",
+    "python",
     "scenes",
     "test-a-node",
     "view",
@@ -210,7 +214,7 @@ def test_what_a_guide_sends_to_the_display_is_what_its_radiance_output_holds(pag
 # --- what is generated -----------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def generated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The generated pages: those that `make pages` wrote, where no source has changed since."""
     with pytest.MonkeyPatch.context() as patch:

@@ -93,6 +93,7 @@ def test_it_is_found_by_its_entry_points(site: Path) -> None:
     assert added >= {("shading", "toon", "rendergraph-sketch"), ("mesh loader", ".stl", "rendergraph-sketch")}
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_its_own_tests_pass(source: Path, site: Path) -> None:
     words = [

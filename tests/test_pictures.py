@@ -53,6 +53,7 @@ def test_every_picture_has_one_way_to_be_made() -> None:
     assert [program for program in programs if not (DOCS.parent / program).is_file()] == []
 
 
+@pytest.mark.nightly(keep=24)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, one in LIST.pictures.items() if one.panels])
 def test_the_commands_of_a_picture_pass_check(

@@ -398,6 +398,7 @@ def test_a_forgotten_reader_is_caught(share: int, base: Expansion, seed: int) ->
             assert_valid(replace(plan, released=released))
 
 
+@pytest.mark.nightly(keep=24)
 @pytest.mark.parametrize("name", sorted(shipped_pipelines()))
 def test_shipped_pipelines_are_proven_and_valid(name: str) -> None:
     base = load(name).expand().expansion

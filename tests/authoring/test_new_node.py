@@ -219,6 +219,7 @@ def test_the_verb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytes
     assert main(["new-node", "more", "--kind", "cubist"]) == 2
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("words", [(), ("a study",)])
 def test_a_project_and_a_new_node_in_it_run_without_options(

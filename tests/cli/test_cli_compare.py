@@ -236,6 +236,7 @@ def test_a_sweep_of_which_nothing_can_be_drawn_says_why(cli: Any, tmp_path: Path
         assert [row["run"] for row in csv.DictReader(file)] == ["a.mode=3"]
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_search_is_a_sweep_s_file_too(cli: Any, tmp_path: Path) -> None:
     pytest.importorskip("optuna")
@@ -455,6 +456,7 @@ def test_a_sweep_keeps_typed_values_and_a_table(cli: Any, tmp_path: Path) -> Non
     assert cli("sweep", "ssao-hemisphere", *axes, *words, "--resume", "--json").json["resumed"] == 4
 
 
+@pytest.mark.nightly
 def test_layers_of_an_array_are_measured_together(cli: Any) -> None:
     """The shadow map of one light is an array of one layer."""
     told = cli("compare", "forward", "deferred", *SMALL, "--metric", "sun.shadow_map", "-n", "1", "--json").json

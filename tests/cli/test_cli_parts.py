@@ -51,6 +51,7 @@ def write(folder: Path) -> None:
         (folder / name).write_text(text)
 
 
+@pytest.mark.nightly
 # imageio-ffmpeg leaves the pipes of its process to be closed when they are collected.
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")

@@ -97,6 +97,7 @@ def pictures(folder: Path) -> dict[str, bytes]:
     return {path.parent.name: path.read_bytes() for path in folder.glob("*/*.exr")}
 
 
+@pytest.mark.nightly
 def test_64_variants_are_the_same_one_by_one_and_by_processes(
     base: rg.Pipeline, gl: rg.Session, tmp_path: Path
 ) -> None:

@@ -175,8 +175,8 @@ def test_functions_and_views_are_renamed_with_their_nodes(gl: rg.Session) -> Non
         np.testing.assert_array_equal(together, own)
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
-@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize("name", shipped_pipelines())
 def test_every_shipped_pipeline_is_drawn_as_alone(gl: rg.Session, name: str) -> None:
     base = rg.load(name, size=(48, 27))

@@ -190,6 +190,7 @@ def check(frame: rg.Frame) -> None:
     np.testing.assert_array_equal(front, drawn_front)
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("scene", ["spheres", "shadow_study", "still_life", "lantern"])
 def test_a_surface_is_what_a_geometry_pass_draws(gl: rg.Session, plugins: Path, tmp_path: Path, scene: str) -> None:
     """Without textures, whose level the pass chooses by the pixel's size."""
@@ -270,6 +271,7 @@ def test_every_use_of_textures_and_transforms_is_the_same(gl: rg.Session, plugin
 SMALL = ("BoxTextured.glb", "TextureTransformTest/TextureTransformTest.gltf", "TwoSidedPlane/TwoSidedPlane.gltf")
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.usefixtures("level_0")
 @pytest.mark.parametrize("name", SMALL)
 def test_textured_surfaces_are_too(gl: rg.Session, plugins: Path, shared: Path, name: str) -> None:

@@ -172,8 +172,8 @@ def small(name: str) -> rg.Pipeline:
     return pipeline
 
 
+@pytest.mark.nightly(keep=4)
 @pytest.mark.slow
-@pytest.mark.nightly(keep=10)
 @pytest.mark.parametrize("name", sorted(shipped_pipelines()))
 def test_shipped_pipelines_draw_the_same_in_another_order_with_poisoned_memory(gl: rg.Session, name: str) -> None:
     plain = gl.render(small(name), alias=False, warm_up=False)

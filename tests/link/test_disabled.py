@@ -219,7 +219,7 @@ def test_who_types_what_an_environment_takes_the_place_of_is_told(tmp_path: Path
     assert link(written, catalog, (SUN,), environment=AROUND).warnings == ()
 
 
-@pytest.mark.nightly(keep=24)
+@pytest.mark.nightly(keep=8)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", shipped_pipelines())
 def test_every_node_goes_or_is_named(name: str) -> None:

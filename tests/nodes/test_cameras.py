@@ -83,7 +83,7 @@ def differing(a: Floats, b: Floats, by: float) -> float:
     return float((np.abs(a - b).max(axis=-1) > by).mean())
 
 
-@pytest.mark.nightly(keep=6)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(shipped_pipelines()))
 def test_every_pipeline_draws_what_every_camera_sees(session: rg.Session, scene: Path, name: str) -> None:

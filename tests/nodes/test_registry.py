@@ -66,7 +66,9 @@ def test_docs_are_sentences(name: str) -> None:
     assert list(doc_problems(CATALOG.get(name).cls)) == []
 
 
-ALIKE = {
+LIGHTING = {
+    "forward_lighting",
+    "deferred_lighting",
     "forward_multipass",
     "forward_shadow_volumes",
     "deferred_stencil_lights",
@@ -74,7 +76,7 @@ ALIKE = {
     "depth_peeling",
     "deferred_multisampled",
 }
-"""Lighting nodes with the variants of `forward_lighting` and `deferred_lighting`, which take a tenth of the tests' time."""
+"""Lighting nodes: their programs are the longest of those that draw, so their variants are compiled at night."""
 
 
 LONG = {"path_traced", "traced_reflections", "traced_interreflection", "traced_occlusion_and_light"}
@@ -82,7 +84,7 @@ LONG = {"path_traced", "traced_reflections", "traced_interreflection", "traced_o
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in BUILTIN if name not in ALIKE | LONG])
+@pytest.mark.parametrize("name", [name for name in BUILTIN if name not in LIGHTING | LONG])
 def test_every_variant_compiles_and_the_default_passes_check_node(name: str) -> None:
     """Uniforms as declared, everything written, nothing else touched or left behind."""
     assert examine(CATALOG.get(name), renders=lambda variant: not variant.name).mistakes == ()

@@ -61,6 +61,7 @@ def refused(texts: dict[str, str], folder: Path) -> str:
     return ""
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("name", ["forward", "shadow-volumes-zfail", "full"])
 def test_some_programs_are_taken(name: str, tmp_path: Path) -> None:
     all_programs = list(programs(rg.load(name)))

@@ -34,8 +34,8 @@ def test_an_example_is_valid_and_uses_the_node(tmp_path: Path, name: str) -> Non
     assert [node.id for node in pipeline.link().graph.nodes if node.type.name == name and node.id not in culled]
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
-@pytest.mark.nightly(keep=4)
 @pytest.mark.parametrize("name", TYPES)
 def test_an_example_runs(gl: Any, tmp_path: Path, name: str) -> None:
     frame = gl.render(example(name, tmp_path), warm_up=False)

@@ -557,6 +557,7 @@ outputs: {velocity: gbuffer.velocity, depth: gbuffer.depth}
     assert np.abs((found - expected) * SIZE).max() < 0.02
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("name", ["shadow-cascaded", "traced-shadows", "taa", "shadow-volumes-zfail"])
 def test_reused_steps_and_culling_see_the_pose(gl: rg.Session, stage: Path, name: str) -> None:
     """Frames are those in which every step runs and every object is drawn, in whatever order they come."""

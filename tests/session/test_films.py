@@ -56,6 +56,7 @@ def test_a_film_is_as_long_as_the_motion(tmp_path: Path) -> None:
         lengths("", tmp_path, frames="clip")
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # the reader leaves pipes open
 @pytest.mark.parametrize("ending", [".mp4", ".webp", ".gif"])
 def test_every_kind_of_film_holds_its_frames(gl: rg.Session, scene: Path, ending: str) -> None:

@@ -213,6 +213,7 @@ def test_a_page_does_no_other_operations_and_names_no_files(operation: list[Any]
         parse_message(json.dumps({"do": "edit", "operations": [operation]}))
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("scene", [None, "lone", "endless"])
 def test_a_saved_file_shows_the_scene_by_the_camera_that_was_moved(
     gl: rg.Session, folder: Path, scene: str | None

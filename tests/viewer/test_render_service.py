@@ -65,6 +65,7 @@ def test_the_description_comes_once_a_change(service: RenderService) -> None:
     assert changed.facts["pipeline"]["nodes"]["light"]["parameters"]["ambient"]["value"] == 0.5
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("pipeline", "setting", "runs"),
     [
@@ -215,6 +216,7 @@ def test_exposure_is_of_light_alone(service: RenderService, tmp_path: Path) -> N
     np.testing.assert_array_equal(picture(service.answer(RenderRequest(FORWARD, exposure=2.0)), tmp_path), image)
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize(
     ("pipeline", "path"),
     [

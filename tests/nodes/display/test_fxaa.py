@@ -56,6 +56,7 @@ def test_an_edge_differs_by_a_share_of_what_is_brighter(draw: Any, bright: float
     assert (frame["image"][4, 4, 0] != frame["plain"][4, 4, 0]) == smooth
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("scene", ["shadow_study", "stairs"])
 def test_pictures_come_nearer_to_those_of_more_pixels(session: rg.Session, scene: str) -> None:
     def shown(pipeline: str, size: tuple[int, int]) -> Any:

@@ -40,6 +40,7 @@ def test_figures_are_of_the_whole_picture(session: rg.Session, size: tuple[int, 
     assert frame.figures["mean"] == pytest.approx(count.mean(), rel=1e-5)
 
 
+@pytest.mark.nightly
 def test_behind_a_pre_pass_what_is_seen_is_drawn_once(session: rg.Session) -> None:
     pipeline = rg.load("overdraw", scene="many_lights", size=(96, 54))
     plain = session.render(pipeline, taps=["overdraw.count"]).arrays["overdraw.count"]

@@ -43,6 +43,7 @@ def drawn(
     return session.render(loaded, outputs=["image", "radiance"])
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(("pipeline", "material"), [("forward", "veil"), ("deferred", "veil"), ("forward", "glass")])
 def test_light_over_a_background_is_the_picture_with_it(
     session: rg.Session, tmp_path: Path, pipeline: str, material: str

@@ -87,6 +87,7 @@ def halton(index: int, base: int) -> float:
     return int(digits, base) / float(base ** len(digits)) - 0.5
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("view", ["guard_band", "hemicube"])
 def test_a_wider_view_knows_how_far_it_is_jittered(session: rg.Session, view: str) -> None:
     """Nothing moves, while the camera's picture does: by as many texels in a band, and not at all in a hemicube."""

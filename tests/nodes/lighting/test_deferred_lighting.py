@@ -81,6 +81,7 @@ def test_the_picture_is_that_of_forward(session: rg.Session, scene: str) -> None
     assert (np.abs(deferred - forward).max(-1) > 1).mean() <= 1e-3
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("scene", ["shadow_study", "stairs"])
 def test_a_near_plane_of_a_twentieth_of_a_millimetre(session: rg.Session, tmp_path: Path, scene: str) -> None:
     """Some modellers write it; depth that is not reversed then differs in 6 and 37 % of the pixels."""
@@ -139,6 +140,7 @@ def test_each_term_alone(radiance: Any, steps_off: Any, tmp_path: Path, term: st
     same(steps_off(radiance("deferred", scene, FULL, terms), radiance("forward-prepass", scene, terms)))
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_shadows_looked_up_in_place_or_in_screen_space(radiance: Any) -> None:
     """The geometric normal comes from depth in both; against forward, where it is the triangle's, edges are aside."""
@@ -210,6 +212,7 @@ def test_compact_is_off_by_half_a_step_of_ten_bits_of_the_root_of_base_colour(se
     assert np.median(relative) <= 0.001
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ["stairs", "shadow_study"])
 def test_compact_coefficients_of_the_empirical_models_are_finer(radiance: Any, scene: str) -> None:

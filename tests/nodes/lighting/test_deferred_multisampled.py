@@ -43,7 +43,7 @@ def test_the_picture_is_that_of_every_sample_lit(session: rg.Session, scene: str
     np.testing.assert_allclose(marked.arrays["edge_share"], edges.mean(), rtol=1e-6)
 
 
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("scene", "taps", "size"),
     [
@@ -103,6 +103,7 @@ cameras: {main: {eye: [-0.4, 4, 1], target: [0.4, 0, 0], near: 0.1, far: 60}}
 """
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     "changed",
     [
@@ -143,6 +144,7 @@ def test_light_volumes_light_every_sample(session: rg.Session) -> None:
     assert (steps_apart(*images) > 1).mean() <= 0.001
 
 
+@pytest.mark.nightly
 def test_memory_is_shared_poisoned_and_shuffled_without_a_trace(session: rg.Session) -> None:
     pipeline = rg.load("deferred-msaa", scene="glass", size=(48, 32))
     plain = session.render(pipeline, alias=False)

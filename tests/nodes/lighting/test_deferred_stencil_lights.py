@@ -51,7 +51,7 @@ LIGHTS = {
 }
 
 
-@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("name", LIGHTS)
 def test_it_draws_the_deferred_picture(radiance: Any, steps_off: Any, tmp_path: Path, name: str) -> None:
     scene = room(tmp_path, LIGHTS[name])
@@ -59,6 +59,7 @@ def test_it_draws_the_deferred_picture(radiance: Any, steps_off: Any, tmp_path: 
     assert off.max() <= 1.001
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize(
     "camera",
     [
@@ -112,6 +113,7 @@ def fragments(session: rg.Session, pipeline: rg.Pipeline) -> list[int]:
     return counts
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize(
     "name", ["a point light before the eye", "the eye on the volume's face", "a spot light", "one behind the other"]
 )

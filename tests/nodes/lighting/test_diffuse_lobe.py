@@ -68,6 +68,7 @@ def cosines() -> Floats:
         return np.asarray(np.sqrt(1 - place[:, None] ** 2 - place**2))
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(("pipeline", "roughness"), [("forward", 0.5), ("deferred", 0.25)])
 def test_white_paint_in_white_light_is_white(
     session: rg.Session, shared: Path, tmp_path: Path, pipeline: str, roughness: float
@@ -88,6 +89,7 @@ def test_white_paint_in_white_light_is_white(
     np.testing.assert_allclose(drawn("shared")[inside], 1, atol=0.005)
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("pipeline", ["forward", "deferred", "deferred-stencil-lights"])
 def test_light_of_a_lamp_is_shared_alike(session: rg.Session, tmp_path: Path, pipeline: str) -> None:
     (tmp_path / "ball.yaml").write_text(BALL % 0.3)

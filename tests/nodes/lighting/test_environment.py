@@ -81,7 +81,7 @@ CONNECTED: dict[str, Any] = {"constant": {"type": "constant"}, "light": {"inputs
 HIDDEN: dict[str, Any] = {"hidden": {"type": "half_open"}, "light": {"inputs": {"occlusion": "hidden.occlusion"}}}
 
 
-@pytest.mark.nightly(keep=3)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("name", PIPELINES)
 @pytest.mark.parametrize("shading", ["phong", "blinn_phong"])
 def test_the_same_light_from_everywhere_is_the_constant(
@@ -95,7 +95,7 @@ def test_the_same_light_from_everywhere_is_the_constant(
     np.testing.assert_allclose(found, expected, atol=1e-3)
 
 
-@pytest.mark.nightly(keep=3)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("name", ["forward", "deferred"])
 @pytest.mark.parametrize("patch", [{}, CONNECTED], ids=["constant", "environment"])
 @pytest.mark.parametrize("shading", ["pbr", "phong"])
@@ -168,7 +168,7 @@ def test_it_goes_under_the_term_ambient(session: rg.Session, plugins: list[Path]
     np.testing.assert_allclose(terms[0][..., :3], sum(term[..., :3] for term in terms[1:]), rtol=1e-3)
 
 
-@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("name", PIPELINES[1:])
 @pytest.mark.parametrize("model", ["pbr", "anisotropic", "phong", "unlit"])
 def test_all_ways_of_drawing_agree(session: rg.Session, plugins: list[Path], name: str, model: str) -> None:

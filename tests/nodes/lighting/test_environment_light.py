@@ -83,7 +83,7 @@ def test_harmonics_are_the_integrals(session: rg.Session, references: Path, tmp_
     assert (np.abs(bands - table["sh"]) / mean).max() < 0.01
 
 
-@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("name", NAMES)
 def test_irradiance_is_that_of_nine_harmonics(asked: Asked, references: Path, name: str) -> None:
     table, mean = oracles(references, name)
@@ -92,6 +92,7 @@ def test_irradiance_is_that_of_nine_harmonics(asked: Asked, references: Path, na
     assert (np.abs(found - expected) / (np.pi * mean)).max() < 0.01
 
 
+@pytest.mark.nightly
 def test_the_window_keeps_light_from_ringing(session: rg.Session, asked: Asked, tmp_path: Path) -> None:
     """Nine harmonics of one small light fall below 0 behind it, and are cut there; damped they need not be."""
     from rendergraph.images import write
@@ -229,6 +230,7 @@ def test_a_coloured_metal_in_even_light(session: rg.Session, references: Path, t
         np.testing.assert_allclose(picture[inside], ((f0 * a + b) * factor)[inside], rtol=0.015)
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("smith", ["exact", "fast"])
 def test_the_whole_against_the_unsplit_integral(
     asked: Asked, references: Path, session: rg.Session, smith: str

@@ -160,6 +160,7 @@ def test_gouraud_is_phong_on_a_flat_white_wall_and_near_it_elsewhere(session: rg
     assert not np.array_equal(fragment, vertex)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_gouraud_and_flat_keep_shadows(session: rg.Session) -> None:
     """Shadows are looked up at fragments whatever light is evaluated at, in both forms."""

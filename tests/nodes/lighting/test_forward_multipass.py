@@ -10,6 +10,7 @@ import pytest
 import rendergraph as rg
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ["cornell_box", "spheres", "many_lights"])
 def test_it_draws_the_forward_picture(radiance: Any, steps_off: Any, scene: str) -> None:
@@ -27,7 +28,7 @@ def test_blended_surfaces_come_last(radiance: Any, steps_off: Any) -> None:
     assert off.max() <= 6
 
 
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ["gltf/AlphaBlendModeTest.glb", "gltf/DamagedHelmet.glb", "gltf/UnlitTest.glb"])
 def test_it_draws_the_forward_picture_of_assets(radiance: Any, steps_off: Any, shared: Path, scene: str) -> None:

@@ -27,6 +27,7 @@ def test_it_is_the_picture_of_visibility(radiance: Any, steps_off: Any, scene: s
     assert (steps_off(masked, radiance("forward-multipass", scene, "light.lookup=null")) > 8).mean() > 0.02
 
 
+@pytest.mark.nightly
 def test_lights_that_cast_none_shine_everywhere(radiance: Any) -> None:
     lit = radiance("forward-multipass", "many_lights", "light.lookup=null")
     one, some = (radiance("shadow-volumes-masked", "many_lights", f"light.light={x}") for x in ("outer.0", SOME))

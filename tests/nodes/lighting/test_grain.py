@@ -75,6 +75,7 @@ def test_a_grain_that_comes_with_time(session: rg.Session, tmp_path: Path) -> No
         np.testing.assert_array_equal(found, expected)
 
 
+@pytest.mark.nightly
 def test_all_ways_of_drawing_agree(session: rg.Session, scenes: tuple[Path, Path]) -> None:
     forward = radiance(session, "forward", scenes[0])
     for name in ("deferred", "deferred-stencil-lights", "forward-multipass"):

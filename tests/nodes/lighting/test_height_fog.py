@@ -57,7 +57,7 @@ def radiance(session: rg.Session, pipeline: str | Path, *sets: str, scene: str |
     return np.asarray(session.render(loaded, outputs=["radiance"], taps=["light.radiance"])[port], np.float64)
 
 
-@pytest.mark.nightly(keep=3)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("pipeline", [name for name, _ in PIPELINES])
 def test_every_surface_and_the_background_are_seen_through_air(session: rg.Session, haze: Path, pipeline: str) -> None:
     """Where air is everywhere the same, the whole picture is: transmittance × picture + glow, glass included."""
@@ -69,6 +69,7 @@ def test_every_surface_and_the_background_are_seen_through_air(session: rg.Sessi
     assert clear[..., :3].std() > 0.05
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("pipeline", ["forward", "deferred", "deferred-msaa"])
 def test_a_plain_background_is_seen_through_air(session: rg.Session, haze: Path, pipeline: str) -> None:
     sets = ("light.environment=null", "light.background=[0.2, 0.4, 0.8]")

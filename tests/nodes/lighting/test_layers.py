@@ -85,6 +85,7 @@ def test_sheen_reflects_its_albedo_in_white_light(drawn: Callable[..., Floats], 
     assert max(expected) > 0.25
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("pipeline", ["forward", "deferred"])
 def test_layers_over_white_are_white_in_white_light(drawn: Callable[..., Floats], pipeline: str) -> None:
     """Each layer takes from what lies below just what it reflects, also where fibres alone would reflect too much."""
@@ -96,6 +97,7 @@ def test_layers_over_white_are_white_in_white_light(drawn: Callable[..., Floats]
     assert np.ptp(film[ball()[..., 2] > 0.1], axis=-1).max() > 0.15, "the film is coloured"
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("pipeline", ["forward", "deferred"])
 def test_light_of_a_lamp_on_coat_and_sheen(drawn: Callable[..., Floats], pipeline: str) -> None:
     normal, light, view = ball(), np.array([0.3, 0.4, 1]) / np.linalg.norm([0.3, 0.4, 1]), np.array([0, 0, 1.0])
@@ -206,6 +208,7 @@ cameras: {main: {eye: [0, 0, 4], target: [0, 0, 0], height: 2}}
 """
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("pipeline", ["forward", "deferred"])
 def test_a_volume_tints_by_its_depth(session: rg.Session, tmp_path: Path, pipeline: str) -> None:
     """Of an index of refraction of 1 nothing is reflected: base colour times what is left of 2 × 0.3 m, at scale 2."""

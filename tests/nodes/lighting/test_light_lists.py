@@ -46,7 +46,7 @@ def load(guide: Path, name: str, *sets: str) -> rg.Pipeline:
     return rg.load(guide / f"{name}.yaml", size=SIZE, sets=sets, plugins=[guide])
 
 
-@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("pipeline", PIPELINES)
 def test_the_picture_is_that_of_a_loop_over_all_lights(session: rg.Session, guide: Path, pipeline: str) -> None:
     listed = session.render(load(guide, pipeline), outputs=["radiance"])["radiance"]

@@ -51,7 +51,7 @@ def drawn(session: rg.Session, pipeline: str, *taps: str) -> list[Floats]:
     return [np.asarray(frame.arrays[tap], np.float64)[..., :3] for tap in taps]
 
 
-@pytest.mark.nightly(keep=3)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(("pipeline", "sets"), VARIANTS)
 def test_the_sum_of_the_parts_is_the_radiance(session: rg.Session, pipeline: str, sets: tuple[str, ...]) -> None:
     """Of opaque surfaces: the reflections of the environment in glass have no output."""
@@ -70,6 +70,7 @@ def test_the_sum_of_the_parts_is_the_radiance(session: rg.Session, pipeline: str
     np.testing.assert_allclose(radiance, plain, rtol=0 if session.device.software else 1e-6)  # GPUs fuse other terms
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("pipeline", ["forward", "deferred"])
 def test_diffuse_light_is_irradiance_times_albedo(session: rg.Session, pipeline: str) -> None:
     _, found = parts(session, pipeline, ("diffuse", "irradiance"), scene="spheres")
@@ -160,6 +161,7 @@ REFLECTED = np.array([2.0, 0.5, 0.25])
 CONFIDENCE = 1 - np.abs(2 * (np.arange(SIZE[0]) + 0.5) / SIZE[0] - 1)[None, :, None]
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("pipeline", ["forward", "deferred"])
 def test_reflections_replace_the_environment(session: rg.Session, mirror: Path, pipeline: str) -> None:
     names = ("environment_reflection", "specular_albedo")
@@ -176,6 +178,7 @@ def test_reflections_replace_the_environment(session: rg.Session, mirror: Path, 
     np.testing.assert_array_equal(unsure, before)
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("pipeline", ["forward", "deferred"])
 def test_reflections_need_no_environment(session: rg.Session, mirror: Path, pipeline: str) -> None:
     """Without one they replace what metals reflect of the constant ambient light, 0.03."""

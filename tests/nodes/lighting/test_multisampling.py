@@ -37,6 +37,7 @@ def linear(display: Floats) -> Floats:
     return np.asarray(np.where(c > 0.04045, ((c + 0.055) / 1.055) ** 2.4, c / 12.92))
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("sets", [(), ("light.type=forward_multipass",)])
 def test_edges_come_near_those_of_a_picture_four_times_as_large(session: rg.Session, sets: tuple[str, ...]) -> None:
     pipeline = rg.load("forward", scene="shadow_study", sets=[*sets, "sun.resolution=256"])
@@ -103,6 +104,7 @@ def test_one_sample_is_taken_by_what_reads_a_pixel(session: rg.Session) -> None:
     assert shown(session, pipeline.patch({"nodes": one})).mean() > 0.01
 
 
+@pytest.mark.nightly
 def test_memory_is_shared_poisoned_and_shuffled_without_a_trace(session: rg.Session) -> None:
     nodes = {
         "prepass": {"type": "depth_prepass", "params": {"samples": 4}},

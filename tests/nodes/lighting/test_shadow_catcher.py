@@ -98,6 +98,7 @@ def at(picture: Floats, x: float, z: float) -> Floats:
     return np.asarray(picture[np.unravel_index(np.argmin(away), away.shape)])
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize(
     ("pipeline", "sets"),
     [
@@ -122,6 +123,7 @@ def test_ground_without_shadows_is_the_environment(
     assert ((found[..., 3] == 1) == ground_points()[1]).mean() > 0.999
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("pipeline", ["forward", "forward-multipass", "deferred", "deferred-stencil-lights"])
 def test_a_shadow_leaves_the_light_of_the_environment(drawn: Callable[..., Floats], pipeline: str) -> None:
     """The irradiance of an environment that is linear in the direction is π (MEAN + 2/3 SLOPE · normal)."""
@@ -141,6 +143,7 @@ def test_phong_shading_leaves_it_too(drawn: Callable[..., Floats]) -> None:
     np.testing.assert_allclose(at(found, 1.0, 0.0)[:3], at(unshadowed, 1.0, 0.0) * ratio, rtol=4e-3)
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("pipeline", "sets"),
     [
@@ -226,6 +229,7 @@ def whitened(session: rg.Session, folder: Path, pipeline: str, height: float, si
     return np.asarray((pictures[1] - pictures[0]).mean(axis=2))
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("pipeline", ["forward", "forward-multipass", "shading-gouraud", "deferred"])
 def test_the_ground_mirrors_what_stands_on_it(session: rg.Session, folder: Path, pipeline: str) -> None:
     """Before the wall it adds the ground's reflectance for the angle, and beside it nothing."""
@@ -238,6 +242,7 @@ def test_the_ground_mirrors_what_stands_on_it(session: rg.Session, folder: Path,
     assert np.abs(difference[rows, :8]).max() < 1e-3
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("pipeline", ["forward", "deferred"])
 def test_a_mirrored_edge_lies_as_far_below_the_ground(session: rg.Session, folder: Path, pipeline: str) -> None:
     """The mirror image of a wall ends where a wall would that goes as deep as this one is high."""

@@ -141,6 +141,7 @@ def test_rough_surfaces_have_no_rays(session: rg.Session, room: dict[bool, Path]
     assert {0, 1} < set(np.unique(found))
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_reduced_scale_is_interpolated_and_samples_agree(session: rg.Session, room: dict[bool, Path]) -> None:
     glossy = room[True].with_name("glossy.yaml")
@@ -156,6 +157,7 @@ def test_a_reduced_scale_is_interpolated_and_samples_agree(session: rg.Session, 
         assert np.quantile(np.abs(blocks / many_blocks - 1), 0.75) < 0.3
 
 
+@pytest.mark.nightly
 def test_a_mirror_shows_what_is_behind_tinted_glass(session: rg.Session, tmp_path: Path) -> None:
     """A glowing wall through a thin pane, in the mirror: 96 % of it, tinted, as `path_traced` finds it."""
     (tmp_path / "pane.yaml").write_text("""scene: 1

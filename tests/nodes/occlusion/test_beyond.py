@@ -47,6 +47,7 @@ cameras: {main: {eye: [0, 1.5, 4], target: [0, 0.5, 0], fov_y_degrees: 35, near:
 """
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("sun", ["shadow_map", "shadow_cascaded", "shadow_trapezoidal"])
 def test_a_guard_band_is_a_wider_picture(draw: Draw, sun: str) -> None:
     """Texel by texel, but where a shadow's edge lies in another texel of another map; its middle is the picture."""
@@ -79,6 +80,7 @@ cameras: {main: {eye: [0, 3, 0.001], target: [0, 0, 0], fov_y_degrees: 36.87, ne
 """
 
 
+@pytest.mark.nightly(keep=1)
 @BEYOND
 def test_a_wall_beside_the_picture_lights_the_floor(draw: Draw, beyond: dict[str, list[str]]) -> None:
     """A glowing wall 0.2 m outside of the picture: along its middle row what each part of the wall sends, summed."""
@@ -111,6 +113,7 @@ def test_no_layer_is_looked_at_that_nobody_wrote(depths: list[str]) -> None:
         assert view == "right" or drawn[layer] == f"{view}/gbuffer.depth"
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_the_middle_of_a_room_has_the_light_of_all_of_it(draw: Draw, shared: Path, tmp_path: Path) -> None:
     """One path-traced bounce, of which the picture shows the middle half: its walls and lit floor lie beside it."""

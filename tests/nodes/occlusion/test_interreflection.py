@@ -86,6 +86,7 @@ def exchange(across: int, along: int) -> Floats:
     return np.asarray(near[:, None] * near[None] / (np.pi * squared**2) * (1.6 / along / across))
 
 
+@pytest.mark.nightly(keep=1)
 @ALL
 def test_a_groove_that_glows_is_the_closed_form(draw: Draw, technique: str) -> None:
     """Three bounces of two sides that see each other whole, by radiosity; their energies are a geometric series."""
@@ -188,6 +189,7 @@ def test_bounces_in_a_closed_box_are_a_geometric_series(draw: Draw, technique: s
     assert shares[2] == pytest.approx(right[2], rel=0.1)
 
 
+@pytest.mark.nightly(keep=1)
 @ALL
 def test_light_is_linear_and_comes_from_nowhere_else(draw: Draw, technique: str) -> None:
     one, three, none = (draw(technique, GROOVE.format(light=light), {"x": "gi.indirect"})["x"] for light in (1, 3, 0))
@@ -202,7 +204,7 @@ def test_a_plane_sends_itself_nothing(draw: Draw, technique: str) -> None:
     assert draw(technique, scene, {"x": "gi.indirect"})["x"].max() == 0
 
 
-@pytest.mark.nightly(keep=4)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("technique", ["ssao-ssgi", "ssil"])
 @pytest.mark.parametrize("height", [0.05, 1, 20])
 @pytest.mark.parametrize("lens", ["fov_y_degrees: 60", "height: 3"])
@@ -215,7 +217,7 @@ cameras: {{main: {{eye: [0, {height}, 2], target: [0.3, 0, -1], {lens}, near: 0.
     assert draw(technique, scene, {"x": "gi.occlusion"}, *sets, size=(64, 48))["x"][..., 0].min() > 1 - 1e-3
 
 
-@pytest.mark.nightly(keep=3)
+@pytest.mark.nightly(keep=1)
 @ALL
 @pytest.mark.parametrize("by", [0.01, 250])
 def test_light_in_other_units_is_the_same(draw: Draw, technique: str, by: float) -> None:
@@ -271,6 +273,7 @@ def test_light_stays_where_it_is_when_the_eye_goes_back(draw: Draw, technique: s
 # --- what is made of it ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly(keep=1)
 @ALL
 def test_the_picture_has_what_is_sent_on(draw: Draw, technique: str) -> None:
     """`radiance` is the lighting's and `reflected`, which is `indirect` times what is not metal of the base colour."""
@@ -368,6 +371,7 @@ def picture(file: Path) -> Floats:
     return np.asarray(ImageBuf(str(file)).get_pixels(FLOAT), np.float64)[..., :3]
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(("case", "radius"), [("cornell", 0.3), ("cornell", 0.8), ("stairs", 0.5), ("stairs", 1.2)])
 def test_bitmasks_find_the_ray_traced_occlusion(draw: Draw, shared: Path, case: str, radius: float) -> None:
     here = shared / "reference" / "b3_ao" / case
@@ -398,6 +402,7 @@ def test_bitmasks_know_that_a_post_is_thin(draw: Draw, session: rg.Session) -> N
     assert darkest(100) < 0.6
 
 
+@pytest.mark.nightly(keep=1)
 @ALL
 def test_a_filter_takes_noise_and_leaves_the_light(draw: Draw, technique: str) -> None:
     """Few samples are nearer to many, and so is their total."""
@@ -440,6 +445,7 @@ def test_far_light_leaves_occlusion_as_it_is(session: rg.Session, shared: Path, 
     assert abs(off.mean()) < 0.045
 
 
+@pytest.mark.nightly(keep=1)
 @ALL
 def test_half_size_is_near_full_size(draw: Draw, technique: str) -> None:
     full, half = (

@@ -174,6 +174,7 @@ def blur_by_hand(values: Floats, surfaces: Floats, where: Floats, axis: int) -> 
     return made
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(("size", "scale"), [((48, 36), 1), ((81, 61), 0.5)])
 def test_the_blur_is_a_mean_over_the_same_surface(show: Show, size: tuple[int, int], scale: float) -> None:
     frame, camera = show(size, scale)
@@ -185,7 +186,7 @@ def test_the_blur_is_a_mean_over_the_same_surface(show: Show, size: tuple[int, i
     np.testing.assert_allclose(found, expected, atol=2e-3)
 
 
-@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
 @pytest.mark.parametrize(("size", "scale"), [((64, 48), 0.5), ((81, 61), 0.25), ((64, 48), 0.125)])
 def test_upsampling_keeps_to_the_surface(show: Show, size: tuple[int, int], scale: float) -> None:

@@ -41,7 +41,7 @@ def apart(occlusion: Occlusion) -> Occlusion:
     return difference
 
 
-@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(keep=1)
 @TECHNIQUES
 def test_edges_and_contacts_are_those_of_the_whole_size(apart: Occlusion, technique: str) -> None:
     """Posts two texels wide, silhouettes before others and before nothing, corners: no halo, nothing leaks."""
@@ -53,7 +53,7 @@ def test_edges_and_contacts_are_those_of_the_whole_size(apart: Occlusion, techni
     assert mean < 0.4 * np.sqrt((apart(technique, contrast=1) ** 2).mean())
 
 
-@pytest.mark.nightly(keep=4)
+@pytest.mark.nightly(keep=1)
 @TECHNIQUES
 @pytest.mark.parametrize("axis", [0, 1])
 def test_what_is_interpolated_is_smooth(occlusion: Occlusion, technique: str, axis: int) -> None:

@@ -79,6 +79,7 @@ def test_more_samples_are_nearer(occlusion: Occlusion, shared: Path, case: str, 
     assert few > 1.1 * some > many
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("technique", ["hbao", "gtao"])
 def test_horizons_settle_as_samples_rise(occlusion: Occlusion, technique: str) -> None:
     """What is left against ray tracing is what the picture does not show: so against many samples of its own."""
@@ -334,6 +335,7 @@ def test_a_scene_in_other_units_is_the_same_picture(occlusion: Occlusion, techni
     assert np.abs(one - other).mean() < 2e-4
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("technique", "most", "mean"),
     [("hemisphere", 0.1, 0.012), ("disc", 0.12, 0.015), ("hbao", 0.12, 0.015), ("gtao", 0.12, 0.015)],
@@ -387,6 +389,7 @@ def test_what_is_near_the_eye_is_left_open(occlusion: Occlusion) -> None:
     assert occlusion("hemisphere", study(1), radius=0.7, blur=0, nearest=60).min() == 1
 
 
+@pytest.mark.nightly(keep=1)
 @ALL
 def test_ambient_light_is_scaled(session: rg.Session, technique: str) -> None:
     def radiance(*sets: str) -> Any:

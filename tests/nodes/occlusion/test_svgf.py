@@ -104,6 +104,7 @@ def test_the_variance_falls_with_the_number_of_frames(still: Sequence[dict[str, 
     assert still[15]["variance"][floor, :, 0].mean() == pytest.approx(found, rel=0.35)
 
 
+@pytest.mark.nightly
 def test_a_plate_that_glows_leaves_no_trail_on_the_floor_in_its_plane(session: rg.Session, room: Path) -> None:
     """The floor that it uncovers begins anew, and the plate goes on; without the objects' numbers it is smeared."""
     moving = room.with_name("moving.yaml")

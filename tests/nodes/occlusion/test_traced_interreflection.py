@@ -163,6 +163,7 @@ def test_light_of_the_picture_is_reused(session: rg.Session, shared: Path) -> No
     assert doubled.mean() > 1.05 * reused.mean()
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_both_at_once_are_occlusion_and_light(session: rg.Session) -> None:
     """`traced_occlusion_and_light` in place of `ssil`, against the two nodes that trace them apart."""
@@ -191,6 +192,7 @@ def test_a_filter_takes_noise_and_a_reduced_scale_is_interpolated(session: rg.Se
         assert abs(few.mean() / many.mean() - 1) < 0.1
 
 
+@pytest.mark.nightly
 def test_a_pane_tints_the_light_that_comes_through_it(session: rg.Session, tmp_path: Path) -> None:
     """A floor under a glowing ceiling with a pane between them: 96 % of the light, tinted; a coat keeps some of it."""
     file = tmp_path / "scene.yaml"

@@ -75,6 +75,7 @@ def test_frames_have_other_rays_and_a_common_mean(session: rg.Session, tmp_path:
     assert mean < 0.35 * single  # independent frames: 1 / sqrt(32) = 0.18
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("output", ["occlusion", "bent_normal"])
 def test_a_reduced_scale_is_interpolated(session: rg.Session, tmp_path: Path, output: str) -> None:
     sets = ("ao.radius=1.5", "ao.samples=256")

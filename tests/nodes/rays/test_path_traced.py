@@ -207,6 +207,7 @@ cameras: {main: {height: %s, eye: [0, 0, 5], target: [0, 0, 0]}}
 """
 
 
+@pytest.mark.nightly
 def test_a_glass_ball_neither_takes_nor_adds_light(session: rg.Session, tmp_path: Path) -> None:
     """Where total reflection, refraction and dispersion are all right, the ball is invisible in white light."""
     text = VIEW % 1.5 + "materials: {glass: {base_color: 1, roughness: 0, ior: 1.7, %s}}\n"
@@ -230,6 +231,7 @@ def test_a_volume_absorbs_along_its_depth(session: rg.Session, tmp_path: Path) -
     np.testing.assert_allclose(image.mean(axis=(0, 1)), expected, rtol=0.01)
 
 
+@pytest.mark.nightly
 def test_a_turned_pane_moves_what_is_behind_it_by_snells_law(session: rg.Session, tmp_path: Path) -> None:
     angle, ior, depth = np.radians(35), 1.5, 0.5
     text = (
@@ -485,7 +487,7 @@ def test_frames_add_samples_until_something_changes(session: rg.Session, tmp_pat
 # Parts ---------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("parameter", "values"),
     [("light_part", ("direct", "indirect")), ("sources", ("lights", "environment", "emissive"))],

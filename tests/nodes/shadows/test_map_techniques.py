@@ -46,7 +46,7 @@ def visibility(session: rg.Session, kind: str, *sets: str, **options: Any) -> Fl
 # --- against ray casting ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.nightly(keep=4)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("case", ["dir_basic", "dir_camera_in_shadow", "spot_basic", "point_room"])
 @pytest.mark.parametrize("kind", ["shadow_pcf", "shadow_vsm", "shadow_msm"])
 def test_narrow_filters_are_the_ray_cast_shadow(session: rg.Session, shared: Path, kind: str, case: str) -> None:
@@ -91,6 +91,7 @@ cameras: {main: {eye: [4, 2.5, 4], target: [0.4, 0.3, 0], fov_y_degrees: 40, nea
 """
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize(("kind", "resolution"), [*((kind, 512) for kind in WIDE), ("shadow_pcf", 8192)])
 def test_what_faces_the_light_has_no_acne(session: rg.Session, tmp_path: Path, kind: str, resolution: int) -> None:
     """A box on a floor, the sun four degrees over it, at the defaults: what no ray is blocked for is lit, to the pixel."""
@@ -126,7 +127,7 @@ def test_what_faces_the_light_has_no_acne(session: rg.Session, tmp_path: Path, k
 # --- both forms ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("scene", ["cornell_box", "shadow_study"])
 @pytest.mark.parametrize("kind", list(WIDE))
 def test_both_forms_give_the_same_picture(session: rg.Session, kind: str, scene: str) -> None:

@@ -190,7 +190,7 @@ def test_a_long_field(session: rg.Session, shared: Path, kind: str, most: float)
     assert found < wrong_share(session, shared, *filtered, "sun.resolution=1024")
 
 
-@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("pipeline", ["shadow-cascaded", "shadow-trapezoidal"])
 @pytest.mark.parametrize("scene", ["avenue", "courtyard"])
 def test_defaults_suit_long_and_short_scenes(session: rg.Session, pipeline: str, scene: str) -> None:

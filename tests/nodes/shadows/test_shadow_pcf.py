@@ -49,7 +49,7 @@ def test_brute_force_is_the_reference(shared: Path, bilinear: Bilinear, taps: in
         assert brute_force(bilinear, depth, place, grid(taps)) == pytest.approx(case[name], abs=1e-6)
 
 
-@pytest.mark.nightly(keep=5)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kernel", "taps", "edges"),
@@ -121,6 +121,7 @@ def wrong_share(session: rg.Session, shared: Path, case: str, *sets: str, pipeli
     return float(100 * (lit != (masks["cls"] == 1))[judged].mean())
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["dir_basic", "dir_camera_in_shadow", "dir_cascades", "spot_basic"])
 def test_hard_shadows_are_the_ray_cast_ones(session: rg.Session, shared: Path, case: str) -> None:
@@ -156,6 +157,7 @@ def test_wider_kernels_make_no_acne(session: rg.Session, shared: Path) -> None:
 # --- both forms ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ["cornell_box", "shadow_study", "spheres"])
 def test_both_forms_give_the_same_picture(session: rg.Session, scene: str) -> None:

@@ -131,7 +131,7 @@ def wrong(session: rg.Session, tmp_path: Path, lit: dict[tuple[bytes, str], Mask
     return measure
 
 
-@pytest.mark.nightly(keep=3)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("silhouettes", ["gpu", "cpu"])
 @pytest.mark.parametrize("method", ["zpass", "zfail", "auto"])
 def test_volumes_are_where_rays_are_stopped(wrong: Any, method: str, silhouettes: str) -> None:
@@ -139,7 +139,7 @@ def test_volumes_are_where_rays_are_stopped(wrong: Any, method: str, silhouettes
     assert wrong(f"shadows.method={method}", f"shadows.silhouettes={silhouettes}") == [0, 0, 0]
 
 
-@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("silhouettes", ["gpu", "cpu"])
 @pytest.mark.parametrize("eye", [EYE, "eye: [-1.6, 4, 1.2], target: [0, 0, 0], "], ids=["askew", "along the sun"])
@@ -215,7 +215,7 @@ def test_modes_change_no_bit(session: rg.Session, tmp_path: Path) -> None:
             assert np.array_equal(session.render(loaded, **mode)["image"], plain)
 
 
-@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("pipeline", ["deferred", "forward-prepass", "deferred-stencil-lights"])
 def test_a_variant_of_every_pipeline_that_has_depth_first(session: rg.Session, pipeline: str) -> None:
@@ -286,6 +286,7 @@ def test_the_reference_is_met_at_every_pixel(
 # --- the pieces -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("shape", ["box", "sphere", "torus_knot"])
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_silhouettes_close_what_the_light_meets(shape: str, mirrored: bool) -> None:
