@@ -10,12 +10,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from functools import cached_property
+from heapq import heappop, heappush
 
 from msgspec import Struct, field
 from msgspec.structs import replace
 
 from rendergraph.errors import InputError, Problem
 from rendergraph.expand import Expansion
+from rendergraph.formatting import format_bytes
 from rendergraph.schedule.dependencies import (
     ReadFirst,
     StepKey,
@@ -27,9 +29,7 @@ from rendergraph.schedule.dependencies import (
     read_first,
     read_first_choices,
 )
-from rendergraph.schedule.model import Cost, Model, alive_all_frame
-from rendergraph.schedule.reasons import culled_reasons, order_reasons
-from rendergraph.schedule.reasons import step_names as step_names
+from rendergraph.schedule.model import Cost, Frame, Model, alive_all_frame
 from rendergraph.schedule.seeds import program_order, random_order, seeds
 from rendergraph.steps import MOST_STEPS, Resource, Step
 
@@ -122,18 +122,18 @@ def schedule(
     waits = dependencies(kept, kept_versions, expansion.overwritten)
     sinks = _sinks(expansion, kept, versions)
     whole_frame = frozenset(alive_all_frame(resources, kept_versions))
-    problem = _SchedulingProblem(kept, waits, resources, shown, whole_frame, sinks)
-    found = _least(problem, read_first_choices(waits, kept, kept_versions, resources), budget_s)
+    frame = Frame(kept, resources, shown, whole_frame, sinks)
+    found = _least(frame, waits, read_first_choices(waits, kept, kept_versions, resources), budget_s)
     model, order, chosen = found.model, found.order, None
     if keep_order or shuffle is not None:
-        model = problem.model(waits)
+        model = Model.of(frame, waits)
         if shuffle is None or keep_order:
             rank = {step.key: number for number, step in enumerate(expansion.steps)}
             order, chosen = program_order(model, [rank[step.key] for step in model.steps]), "in the program's order"
         else:
             order, chosen = random_order(model, shuffle), f"drawn by seed {shuffle}"
     steps = tuple(model.steps[number] for number in order)
-    model = problem.with_copies(model, history_copies(steps, resources))
+    model = replace(model, constant=frame.constant(history_copies(steps, resources)))
     peak, peak_step = model.peak(order)
     return Schedule(
         steps=steps,
@@ -159,25 +159,6 @@ def _sinks(expansion: Expansion, kept: Sequence[Step], versions: Versions) -> li
     return [step for step in finals if step is not None]
 
 
-class _SchedulingProblem(Struct, frozen=True):
-    """The input of the search: steps, dependencies and resources."""
-
-    kept: Sequence[Step]
-    waits: Waits
-    resources: Mapping[str, Resource]
-    shown: set[str]
-    whole_frame: frozenset[str]
-    sinks: Sequence[Step]
-
-    def model(self, waits: Waits) -> Model:
-        return Model.of(waits, self.kept, self.resources, self.whole_frame, self.shown, self.sinks)
-
-    def with_copies(self, model: Model, copies: Mapping[str, int]) -> Model:
-        whole = [self.resources[id] for id in self.whole_frame]
-        sizes = [one.desc.bytes * copies[one.id] if one.role == "history" else one.bytes for one in whole]
-        return replace(model, constant=sum(sizes))
-
-
 class _Ordering(Struct, frozen=True):
     """An order that allocates little, its cost, the least peak found, and a lower bound on the peak."""
 
@@ -188,16 +169,17 @@ class _Ordering(Struct, frozen=True):
     bound: int
 
 
-def _least(problem: _SchedulingProblem, first: ReadFirst, budget_s: float) -> _Ordering:
+def _least(frame: Frame, waits: Waits, first: ReadFirst, budget_s: float) -> _Ordering:
     """Return the best order over all choices of histories to read before they are written.
 
     Other histories need a second texture. A choice is skipped if even the lower bound on its memory is no better than
     the best order found.
     """
-    base = problem.model(problem.waits)
-    single = history_copies(base.steps, problem.resources) | dict.fromkeys(first.turns, 1)
-    sizes = {id: problem.resources[id].desc.bytes for id in first.turns}
-    pool_floor, peak_floor = problem.with_copies(base, single).bounds() if len(first.choices) > 1 else (0, 0)
+    base = Model.of(frame, waits)
+    single = history_copies(base.steps, frame.resources) | dict.fromkeys(first.turns, 1)
+    base = replace(base, constant=frame.constant(single))
+    sizes = {id: frame.resources[id].desc.bytes for id in first.turns}
+    pool_floor, peak_floor = base.bounds() if len(first.choices) > 1 else (0, 0)
     found: list[_Ordering] = []
     for early in first.choices:
         late = [id for id in first.turns if id not in early]
@@ -206,9 +188,9 @@ def _least(problem: _SchedulingProblem, first: ReadFirst, budget_s: float) -> _O
             best, least = min(one.cost.pool for one in found), min(one.least for one in found)
             if best <= pool_floor + extra and least <= peak_floor + extra:
                 continue
-        model = problem.model(read_first(problem.waits, {id: first.turns[id] for id in early})) if early else base
-        model = problem.with_copies(model, single | dict.fromkeys(late, 2))
-        found.append(_optimise(model, budget_s / len(first.choices)))
+        model = Model.of(frame, read_first(waits, {id: first.turns[id] for id in early})) if early else base
+        constant = frame.constant(single | dict.fromkeys(late, 2))
+        found.append(_optimise(replace(model, constant=constant), budget_s / len(first.choices)))
     bound = min(one.bound for one in found)
     if not first.exhaustive:
         bound = min(bound, peak_floor + min(sizes.values()))
@@ -258,3 +240,80 @@ def _ordered(model: Model, budget: int) -> tuple[Sequence[int], Cost, int, int]:
         if improved[:2] < cost[:2]:
             cost, best = improved, better
     return best, cost, least, bound
+
+
+def step_names(steps: Sequence[Step]) -> dict[tuple[str, int], str]:
+    """Return step key to name: the node's id, with number and label if it has several steps; a copy's label."""
+    several = {step.node for step in steps if step.index > 0 and step.kind != "copy"}
+    names = {
+        step.key: f"{step.node}[{f'{step.index} {step.label}'.rstrip()}]" if step.node in several else step.node
+        for step in steps
+    }
+    return names | {step.key: step.label for step in steps if step.kind == "copy"}
+
+
+def order_reasons(model: Model, order: Sequence[int], chosen: str | None) -> dict[tuple[str, int], str]:
+    """Return by step key the reason for its position; `chosen` is how the order was chosen if not by memory."""
+    names = step_names(model.steps)
+    place = {step: number for number, step in enumerate(order)}
+    left = list(model.toucher_count)
+    missing = [len(steps) for steps in model.before]
+    ready = [step for step, number in enumerate(missing) if not number]
+    waiting = len(ready)
+    reasons: dict[tuple[str, int], str] = {}
+    for number, step in enumerate(order):
+        while ready and place[ready[0]] < number:
+            heappop(ready)
+        freed = []
+        for resource in model.touched[step]:
+            left[resource] -= 1
+            if not left[resource]:
+                freed.append(resource)
+        release = ""
+        if freed:
+            largest = max(freed, key=lambda r: model.sizes[r])
+            more = f" and {len(freed) - 1} more" if len(freed) > 1 else ""
+            release = f"releases {model.names[largest]}{more} ({format_bytes(sum(model.sizes[r] for r in freed))})"
+        if waiting == 1:
+            text = "nothing else can run yet" if number + 1 < len(order) else "everything else has run"
+        elif chosen:
+            text = f"{chosen}, of {waiting} that could run"
+        elif step == ready[0]:
+            text = f"first of {waiting} that could run, reading from the outputs"
+        else:
+            text = f"before {names[model.steps[ready[0]].key]}, because less memory is held this way"
+        reasons[model.steps[step].key] = f"{text}; {release}" if release else text
+        waiting -= 1
+        for other in model.after[step]:
+            missing[other] -= 1
+            if not missing[other]:
+                heappush(ready, other)
+                waiting += 1
+    return reasons
+
+
+def culled_reasons(steps: Sequence[Step], kept: Sequence[Step], versions: Versions) -> Mapping[str, str]:
+    """Return by node id why none of its steps runs."""
+    running = {step.node for step in kept}
+    running |= {step.view.rpartition(".")[0] for step in kept if step.view}  # nodes that only set views
+    running |= {function.node for step in kept for function in step.functions}  # nodes whose functions are called
+    culled: dict[str, str] = {}
+    for node in dict.fromkeys(step.node for step in steps):
+        if node in running:
+            continue
+        ids = list(dict.fromkeys(write.resource for step in steps if step.node == node for write in step.writes))
+        readers = {other.node for id in ids for _, other in versions.readers.get(id, ()) if other.node != node}
+        if not ids:
+            culled[node] = "it writes nothing"
+        elif readers:
+            be, do = "is" if len(ids) == 1 else "are", "does" if len(readers) == 1 else "do"
+            culled[node] = f"{_listed(ids)} {be} read only by {_listed(sorted(readers))}, which {do} not run"
+        else:
+            culled[node] = f"nothing reads {_listed(ids)}"
+    return culled
+
+
+def _listed(words: Sequence[str]) -> str:
+    if len(words) > 3:
+        words = [*words[:3], f"{len(words) - 3} more"]
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

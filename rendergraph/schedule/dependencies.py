@@ -55,7 +55,8 @@ class Versions(Struct, frozen=True):
             for write in step.writes:
                 other = writers[write.resource].setdefault(write.version, step)
                 if other is not step:
-                    problems.append(_two_writers(write.resource, other, step))
+                    text = f"'{other.node}' and '{step.node}' both continue '{write.resource}' from the same state; "
+                    problems.append(Problem("RG605", text + "let one of them take the other's output"))
             for read in step.all_reads:
                 if not read.previous:
                     readers[read.resource].append((read.version, step))
@@ -133,7 +134,9 @@ def contributing(
             if before is not None:
                 stack.append(before)
             elif isinstance(resource.desc, TextureDesc) and (write.load == "load" or step.kind == "mipmaps"):
-                problems.append(_loads_nothing(step, write.resource))
+                text = f"the first step that writes '{write.resource}' loads its content, but it has none yet; "
+                text += "give the port a `clear` value or fill it in an earlier step"
+                problems.append(step.problem("RG603", text))
     if problems:
         raise InputError(sorted(set(problems), key=lambda problem: (problem.code, problem.message)))
     return [step for step in steps if step.key in kept]
@@ -270,14 +273,6 @@ def read_first(waits: Waits, turns: Turns) -> Waits:
     return more
 
 
-def _two_writers(resource: str, one: Step, other: Step) -> Problem:
-    return Problem(
-        "RG605",
-        f"'{one.node}' and '{other.node}' both continue '{resource}' from the same state; "
-        f"let one of them take the other's output",
-    )
-
-
 def _unwritten(step: Step, resource: str, versions: Versions, idle: Mapping[str, str]) -> Problem:
     """Explain why a resource is not written: its node is idle or never writes it, or the step comes too early."""
     maker = resource.rpartition(".")[0]
@@ -292,14 +287,6 @@ def _unwritten(step: Step, resource: str, versions: Versions, idle: Mapping[str,
         "write it in an earlier step, or declare it `History` to read last frame's value"
     )
     return step.problem("RG601", text)
-
-
-def _loads_nothing(step: Step, resource: str) -> Problem:
-    text = (
-        f"the first step that writes '{resource}' loads its content, but it has none yet; "
-        "give the port a `clear` value or fill it in an earlier step"
-    )
-    return step.problem("RG603", text)
 
 
 def _cycle(waits: Waits, edges: Sequence[tuple[StepKey, StepKey]], steps: Mapping[StepKey, Step]) -> Problem:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from msgspec import Struct
@@ -30,6 +31,26 @@ class Cost(NamedTuple):
     area: int
 
 
+class Frame(Struct, frozen=True):
+    """The steps and resources to schedule.
+
+    Attributes:
+        shown, whole_frame: ids of the resources that are alive at the frame's end, and during the whole frame.
+        sinks: the steps that write the results of the frame, in a fixed order.
+    """
+
+    kept: Sequence[Step]
+    resources: Mapping[str, Resource]
+    shown: set[str]
+    whole_frame: frozenset[str]
+    sinks: Sequence[Step]
+
+    def constant(self, copies: Mapping[str, int]) -> int:
+        """Return the bytes alive during the whole frame; `copies` has the number of textures of each history."""
+        whole = [self.resources[id] for id in self.whole_frame]
+        return sum(one.desc.bytes * copies[one.id] if one.role == "history" else one.bytes for one in whole)
+
+
 class Model(Struct, frozen=True):
     """Steps numbered in reading order: depth first from the outputs, with inputs in the order of their ports.
 
@@ -39,6 +60,7 @@ class Model(Struct, frozen=True):
     Attributes:
         before, after: numbers of the steps that a step waits for, and of those that wait for it.
         touched: numbers of the resources that a step touches, without those that are alive during the whole frame.
+        touchers: the same by resource: numbers of the steps that touch it.
         born: bytes that become alive with a step.
         classes: number of the storage class of each resource; equal ones can share a texture.
         toucher_count: number of steps that touch each resource, plus one for the frame's end if it is shown.
@@ -50,6 +72,7 @@ class Model(Struct, frozen=True):
     before: tuple[tuple[int, ...], ...]
     after: tuple[tuple[int, ...], ...]
     touched: tuple[tuple[int, ...], ...]
+    touchers: tuple[tuple[int, ...], ...]
     born: tuple[int, ...]
     sizes: tuple[int, ...]
     classes: tuple[int, ...]
@@ -65,22 +88,10 @@ class Model(Struct, frozen=True):
         return *kept, self.shown, self.constant
 
     @classmethod
-    def of(
-        cls,
-        waits: Waits,
-        kept: Sequence[Step],
-        resources: Mapping[str, Resource],
-        whole_frame: Collection[str],
-        shown: Collection[str],
-        sinks: Sequence[Step],
-    ) -> Model:
-        """Number the steps of a dependency graph; `constant` is not counted yet.
-
-        Args:
-            sinks: the steps that write the results of the frame, in a fixed order.
-        """
-        by_key = {step.key: step for step in kept}
-        order = depth_first(waits, [step.key for step in sinks])
+    def of(cls, frame: Frame, waits: Waits) -> Model:
+        """Number the steps of a dependency graph; `constant` is not counted yet."""
+        resources, by_key = frame.resources, {step.key: step for step in frame.kept}
+        order = depth_first(waits, [step.key for step in frame.sinks])
         number = {key: place for place, key in enumerate(order)}
         steps = tuple(by_key[key] for key in order)
         before = tuple(tuple(sorted(number[key] for key in waits[step])) for step in order)
@@ -88,41 +99,30 @@ class Model(Struct, frozen=True):
         for place, earlier in enumerate(before):
             for step_before in earlier:
                 after[step_before].append(place)
-        names: dict[str, int] = {}
-        touched: list[tuple[int, ...]] = []
-        born = [0] * len(steps)
-        sizes: list[int] = []
-        toucher_count: list[int] = []
+        touchers: dict[str, list[int]] = defaultdict(list)
         for place, step in enumerate(steps):
-            mine = []
             for id in touched_ids(step):
-                if id in whole_frame:
-                    continue
-                if id not in names:  # the reading order is legal, so the first step that touches it is its first writer
-                    names[id] = len(names)
-                    toucher_count.append(0)
-                    sizes.append(resources[id].bytes)
-                    born[place] += sizes[-1]
-                mine.append(names[id])
-                toucher_count[names[id]] += 1
-            touched.append(tuple(mine))
-        ending = frozenset(number for id, number in names.items() if id in shown)
-        for resource in ending:
-            toucher_count[resource] += 1
+                if id not in frame.whole_frame:
+                    touchers[id].append(place)
+        names = {id: place for place, id in enumerate(touchers)}
+        sizes = tuple(resources[id].bytes for id in names)
+        born = [0] * len(steps)
+        for (first, *_), size in zip(touchers.values(), sizes, strict=True):
+            born[first] += size  # the reading order is legal, so the first step that touches it is its first writer
         kinds: dict[object, int] = {}
-        classes = tuple(kinds.setdefault(storage_class(resources[id]), len(kinds)) for id in names)
         return cls(
-            steps,
-            before,
-            tuple(map(tuple, after)),
-            tuple(touched),
-            tuple(born),
-            tuple(sizes),
-            classes,
-            tuple(toucher_count),
-            ending,
-            tuple(names),
-            0,
+            steps=steps,
+            before=before,
+            after=tuple(map(tuple, after)),
+            touched=tuple(tuple(names[id] for id in touched_ids(step) if id in names) for step in steps),
+            touchers=tuple(map(tuple, touchers.values())),
+            born=tuple(born),
+            sizes=sizes,
+            classes=tuple(kinds.setdefault(storage_class(resources[id]), len(kinds)) for id in names),
+            toucher_count=tuple(len(places) + (id in frame.shown) for id, places in touchers.items()),
+            shown=frozenset(place for id, place in names.items() if id in frame.shown),
+            names=tuple(names),
+            constant=0,
         )
 
     def __len__(self) -> int:
@@ -181,25 +181,18 @@ class Model(Struct, frozen=True):
         another step that touches it; an output also at every step that must follow its first writer.
         """
         count = len(self)
-        ancestors = [0] * count
-        for step, earlier in enumerate(self.before):
-            for other in earlier:
-                ancestors[step] |= ancestors[other] | 1 << other
-        touchers: list[list[int]] = [[] for _ in self.sizes]
-        for step, resources in enumerate(self.touched):
-            for resource in resources:
-                touchers[resource].append(step)
+        ancestors = _reachable(self.before, range(count))
         live = [self.constant] * count
         alive: dict[int, list[int]] = {}
         visits = MUST_LIVE_VISITS
-        descendants = self._descendants() if visits > count else []
+        descendants = _reachable(self.after, reversed(range(count))) if visits > count else []
         for resource in sorted(range(len(self.sizes)), key=lambda r: (-self.sizes[r], r)):
             mask = within = 0
-            for step in touchers[resource]:
+            for step in self.touchers[resource]:
                 mask |= 1 << step
                 within |= ancestors[step]
             if visits > 0:
-                following = descendants[touchers[resource][0]]
+                following = descendants[self.touchers[resource][0]]
                 mask |= following if resource in self.shown else within & following
             number_alive = alive.setdefault(self.classes[resource], [0] * count)
             while mask:
@@ -220,12 +213,14 @@ class Model(Struct, frozen=True):
         )
         return self.constant + pool, max(self.constant + least, *live)
 
-    def _descendants(self) -> list[int]:
-        found = [0] * len(self)
-        for step in range(len(self) - 1, -1, -1):
-            for other in self.after[step]:
-                found[step] |= found[other] | 1 << other
-        return found
+
+def _reachable(neighbours: Sequence[Iterable[int]], order: Iterable[int]) -> list[int]:
+    """Return for each step a bit mask of all steps that its neighbours lead to, which come before it in `order`."""
+    found = [0] * len(neighbours)
+    for step in order:
+        for other in neighbours[step]:
+            found[step] |= found[other] | 1 << other
+    return found
 
 
 def storage_class(resource: Resource) -> object:

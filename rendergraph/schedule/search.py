@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import count, pairwise
 
@@ -63,10 +63,9 @@ class _Beams:
         self._needs = [sum(1 << earlier for earlier in set(steps)) for steps in before]
         self._after = after
         end = 1 << len(model)
-        masks = [end if resource in model.shown else 0 for resource in range(len(model.sizes))]
-        for step, resources in enumerate(model.touched):
-            for resource in resources:
-                masks[resource] |= 1 << step
+        masks = [sum(1 << step for step in touchers) for touchers in model.touchers]
+        for resource in model.shown:
+            masks[resource] |= end
         # Per step: masks and sizes of its resources; a resource's lifetime ends with the step that completes its mask.
         self._ends = [[(masks[r], model.sizes[r]) for r in resources] for resources in model.touched]
 
@@ -154,15 +153,9 @@ def improve(model: Model, order: Sequence[int], *, pool_bound: int, budget: int)
 
 def _window(model: Model, order: Sequence[int], place: int) -> tuple[int, int]:
     """Return the first and last position that a step may move to while the others keep their order."""
-    step = order[place]
-    early = place
-    waits = set(model.before[step])
-    while early > 0 and order[early - 1] not in waits:
-        early -= 1
-    late = place
-    waiting = set(model.after[step])
-    while late + 1 < len(order) and order[late + 1] not in waiting:
-        late += 1
+    before, after = set(model.before[order[place]]), set(model.after[order[place]])
+    early = next((at + 1 for at in range(place - 1, -1, -1) if order[at] in before), 0)
+    late = next((at - 1 for at in range(place + 1, len(order)) if order[at] in after), len(order) - 1)
     return early, late
 
 
@@ -175,15 +168,9 @@ def twin_chains(model: Model) -> Iterator[tuple[int, int]]:
     branch runs before the n-th of the next.
     """
     colours = _colours(model)
-    shared: dict[int, int] = defaultdict(int)
-    for colour in colours:
-        shared[colour] += 1
+    shared = Counter(colours)
     placed = [shared[colour] == 1 for colour in colours]
     last: dict[tuple[int, ...], list[int]] = {}
-    touchers: list[list[int]] = [[] for _ in model.sizes]
-    for step, resources in enumerate(model.touched):
-        for resource in resources:
-            touchers[resource].append(step)
     for start in range(len(model)):
         if placed[start]:
             continue
@@ -199,7 +186,7 @@ def twin_chains(model: Model) -> Iterator[tuple[int, int]]:
         branch.sort()
         if all(one in model.before[other] for one, other in pairwise(branch)):
             look = tuple(colours[step] for step in branch)
-            if look in last and _exchangeable(model, touchers, last[look], branch):
+            if look in last and _exchangeable(model, last[look], branch):
                 yield from zip(last[look], branch, strict=True)
             last[look] = branch
 
@@ -231,7 +218,7 @@ def _numbered(signatures: Sequence[object]) -> list[int]:
     return [numbers.setdefault(signature, len(numbers)) for signature in signatures]
 
 
-def _exchangeable(model: Model, touchers: Sequence[Sequence[int]], one: Sequence[int], other: Sequence[int]) -> bool:
+def _exchangeable(model: Model, one: Sequence[int], other: Sequence[int]) -> bool:
     swap = dict(zip(one, other, strict=True)) | dict(zip(other, one, strict=True))
     for step, image in swap.items():
         for neighbours in (model.before, model.after):
@@ -239,6 +226,6 @@ def _exchangeable(model: Model, touchers: Sequence[Sequence[int]], one: Sequence
                 return False
     near = sorted({resource for step in swap for resource in model.touched[step]})
     looks = {r: (model.sizes[r], model.toucher_count[r]) for r in near}
-    before = sorted((looks[r], tuple(sorted(touchers[r]))) for r in near)
-    after = sorted((looks[r], tuple(sorted(swap.get(step, step) for step in touchers[r]))) for r in near)
+    before = sorted((looks[r], model.touchers[r]) for r in near)
+    after = sorted((looks[r], tuple(sorted(swap.get(step, step) for step in model.touchers[r]))) for r in near)
     return before == after

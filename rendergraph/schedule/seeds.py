@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from heapq import heapify, heappop, heappush
+from heapq import heappop, heappush
 
-from rendergraph.link.graph import depth_first
+from rendergraph.link.graph import depth_first, upstream_first
 from rendergraph.schedule.model import Model
 
 
@@ -24,15 +24,9 @@ def post_order(model: Model) -> list[int]:
     with bytes in place of registers. It is optimal on trees; a step with several readers counts for each of them.
     """
     count = len(model)
-    left = model.toucher_count
-    # What a step leaves: resources that it creates and that another step touches.
-    leaves = [0] * count
-    seen = bytearray(len(model.sizes))
-    for step in range(count):
-        for resource in model.touched[step]:
-            if not seen[resource]:
-                seen[resource] = 1
-                leaves[step] += model.sizes[resource] if left[resource] > 1 else 0
+    leaves = [0] * count  # bytes of the resources that a step creates and another touches, or the end of the frame
+    for (first, *_), size, touchers in zip(model.touchers, model.sizes, model.toucher_count, strict=True):
+        leaves[first] += size if touchers > 1 else 0
     need = [0] * count
     children: list[list[int]] = [[]] * count
 
@@ -118,15 +112,4 @@ def random_order(model: Model, seed: int) -> list[int]:
 
 def program_order(model: Model, rank: Sequence[int]) -> list[int]:
     """Return the order of `rank`, the position of each step in the program, as far as it is legal."""
-    missing = [len(steps) for steps in model.before]
-    ready = [(rank[step], step) for step, number in enumerate(missing) if not number]
-    heapify(ready)
-    order: list[int] = []
-    while ready:
-        _, step = heappop(ready)
-        order.append(step)
-        for other in model.after[step]:
-            missing[other] -= 1
-            if not missing[other]:
-                heappush(ready, (rank[other], other))
-    return order
+    return upstream_first({step: model.before[step] for step in sorted(range(len(model)), key=rank.__getitem__)})

@@ -10,7 +10,7 @@ from rendergraph.api import Any as AnyTexel
 from rendergraph.api import Internal, Node, Output, Steps
 from rendergraph.compare.timing import step_times
 from rendergraph.errors import InputError
-from rendergraph.schedule.reasons import step_names
+from rendergraph.schedule import step_names
 
 
 class Twice(Node):
