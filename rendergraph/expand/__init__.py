@@ -8,49 +8,64 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from msgspec import Struct, field
 from msgspec.structs import replace
 
 from rendergraph.declare import WrittenPort
 from rendergraph.errors import InputError, Problem
-from rendergraph.expand.model import CAMERA, SCENE_DATA, Expansion, VersionedSteps, ViewTable, follow_forwards
-from rendergraph.expand.recording import define_parameters, param_uniforms, record_all
-from rendergraph.expand.versions import assign_versions
+from rendergraph.expand.recording import OF_SCENE, SCENE_DATA, define_parameters, param_uniforms, record_all
+from rendergraph.expand.versions import VersionAssignment, ViewTable
 from rendergraph.link import Endpoint, Graph
+from rendergraph.link.infer import CAMERA
 from rendergraph.steps import Read, Resource, Role, Step, Write
+
+
+class Expansion(Struct, frozen=True):
+    """All steps of a graph with their resources.
+
+    Attributes:
+        outputs: output name or tap to the id of the resource that must exist at the end of the frame.
+        ports: port to the id of the resource that holds its texture or buffer.
+        overwritten: as in `Graph`.
+    """
+
+    steps: tuple[Step, ...]
+    resources: Mapping[str, Resource]
+    outputs: Mapping[str, str]
+    idle: Mapping[str, str] = field(default_factory=dict)
+    views: Mapping[str, ViewTable] = field(default_factory=dict)
+    ports: Mapping[Endpoint, str] = field(default_factory=dict)
+    overwritten: Mapping[tuple[str, str], Problem] = field(default_factory=dict)
 
 
 def expand(graph: Graph, outputs: Mapping[str, Endpoint] | None = None) -> Expansion:
     """Record every node that `outputs` (name to port, the file's outputs by default) needs at the end of the frame."""
-    outputs = dict(graph.outputs if outputs is None else outputs)
-    order = graph.reading_order()
-    recorded, idle = record_all(graph, order, outputs)
+    outputs = graph.outputs if outputs is None else outputs
+    recorded, idle = record_all(graph, graph.reading_order(), outputs)
     idle |= dict.fromkeys(graph.unlit, "the scene has no environment")
-    expansion = _finalize(graph, assign_versions(graph, recorded, idle), outputs)
-    _check_kept(expansion.steps, expansion.resources)
-    return expansion
-
-
-def _finalize(graph: Graph, found: VersionedSteps, outputs: Mapping[str, Endpoint]) -> Expansion:
-    """Check that every output is written, copy versions that a later node overwrites, and assign final roles."""
-    steps, resources = list(found.steps), dict(found.resources)
-    shown: dict[str, str] = {}
-    for name, port in outputs.items():
-        end = follow_forwards(found.forwarded, port)
-        if end not in found.final or end.node in found.idle:
-            reason = found.idle.get(end.node, "it makes no texture")
-            text = f"output '{name}' shows '{end}', but that is never rendered: {reason}"
-            raise InputError(Problem("RG204", text, graph[end.node].place, subject=str(end)))
-        resource, version = found.final[end]
-        shown[name] = resource
-        if version == found.newest[resource]:
-            continue
-        shown[name] = f"{end} kept"  # an intermediate version is copied
-        if shown[name] not in resources:
-            resources[shown[name]] = replace(resources[resource], id=shown[name], role="output")
-            steps.append(_copy(name, end, resource, version, steps))
-    _mark_roles(graph, found, shown, steps, resources)
+    found = VersionAssignment(graph, recorded, idle)
+    found.run()
+    shown = {name: _shown(found, name, found.follow(port)) for name, port in outputs.items()}
+    _mark_roles(found, set(shown.values()))
+    _check_kept(found.steps, found.resources)
     ports = {end: resource for end, (resource, _) in found.final.items()}
-    return Expansion(tuple(steps), resources, shown, found.idle, found.views, ports, graph.overwritten)
+    return Expansion(tuple(found.steps), found.resources, shown, found.idle, found.views, ports, graph.overwritten)
+
+
+def _shown(found: VersionAssignment, name: str, end: Endpoint) -> str:
+    """Return the id of the resource that an output shows; a version that a later node overwrites is copied."""
+    if end not in found.final or end.node in found.idle:
+        reason = found.idle.get(end.node, "it makes no texture")
+        text = f"output '{name}' shows '{end}', but that is never rendered: {reason}"
+        raise InputError(Problem("RG204", text, found.graph[end.node].place, subject=str(end)))
+    resource, version = found.final[end]
+    if version == found.version[resource]:
+        return resource
+    copy = f"{end} kept"
+    if copy not in found.resources:
+        found.resources[copy] = replace(found.resources[resource], id=copy, role="output")
+        found.steps.append(_copy(name, end, resource, version, found.steps))
+    return copy
 
 
 def _copy(name: str, end: Endpoint, resource: str, version: int, steps: list[Step]) -> Step:
@@ -60,18 +75,17 @@ def _copy(name: str, end: Endpoint, resource: str, version: int, steps: list[Ste
     return Step(end.node, index, "copy", reads=(read,), writes=(write,), label=label)
 
 
-def _mark_roles(
-    graph: Graph, found: VersionedSteps, shown: Mapping[str, str], steps: list[Step], resources: dict[str, Resource]
-) -> None:
+def _mark_roles(found: VersionAssignment, shown: set[str]) -> None:
     """Mark outputs, and resources that outlive the frame: they never share memory."""
-    previous = {read.resource for step in steps for read in step.all_reads if read.previous}
+    graph, resources = found.graph, found.resources
+    previous = {read.resource for step in found.steps for read in step.all_reads if read.previous}
     for end in graph.textures:
         if str(end) in previous and str(end) not in resources:  # its node is idle, so it keeps its first value
             port, info = graph[end.node].node.ports()[end.port], graph.textures[end]
             assert isinstance(port, WrittenPort)
             first = port.first or 0.0
             resources[str(end)] = Resource(str(end), info.storage, "history", first, info.view, info.lights)
-    for name in set(shown.values()) | previous:
+    for name in shown | previous:
         resource = resources[name]
         role: Role = "history" if name in previous else "output"
         role = resource.role if resource.role in ("history", "kept") else role

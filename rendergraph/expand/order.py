@@ -2,86 +2,82 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
-from rendergraph.declare import Function, InOut, Input, Part, Port
+from rendergraph.declare import Function, InOut, Input, Part
 from rendergraph.errors import InputError, Problem
-from rendergraph.expand.model import follow_forwards
-from rendergraph.expand.recording import Recording
-from rendergraph.link import Endpoint, Graph
+from rendergraph.expand.recording import part_of, written_names
+from rendergraph.link import Endpoint
 from rendergraph.link.graph import upstream_first
+
+if TYPE_CHECKING:
+    from rendergraph.expand.versions import VersionAssignment
 
 _Step: TypeAlias = tuple[str, int]
 _Cause: TypeAlias = tuple[str, str, Endpoint]
 """Why a step waits for another: the reading node, its input or port, and the source of the link."""
 
 
-def step_order(
-    graph: Graph, recordings: Mapping[str, Recording], forwarded: Mapping[Endpoint, Endpoint]
-) -> list[_Step]:
+def step_order(found: VersionAssignment) -> list[_Step]:
     """Return node and number of every recorded step in topological order; raise RG117 if there is a cycle."""
-    order = _StepOrder(graph, recordings, forwarded)
-    waits = {(name, number): order.waits(name, number) for name in recordings for number in order.numbers(name)}
-    found = upstream_first(waits)
-    if len(found) < len(waits):
+    order = _StepOrder(found)
+    steps = [(name, number) for name, one in found.recordings.items() for number in range(len(one.requests))]
+    waits = {(name, number): order.waits(name, number) for name, number in steps}
+    sorted_steps = upstream_first(waits)
+    if len(sorted_steps) < len(waits):
         raise InputError(order.cycle(waits))
-    return found
+    return sorted_steps
 
 
 class _StepOrder:
-    def __init__(
-        self, graph: Graph, recordings: Mapping[str, Recording], forwarded: Mapping[Endpoint, Endpoint]
-    ) -> None:
-        self.graph, self.recordings, self.forwarded = graph, recordings, forwarded
-        self.writers: dict[Endpoint, list[int]] = {}
-        for name, recording in recordings.items():
+    def __init__(self, found: VersionAssignment) -> None:
+        self.graph, self.recordings, self.follow = found.graph, found.recordings, found.follow
+        self.writers: dict[Endpoint, list[int]] = defaultdict(list)
+        for name, recording in self.recordings.items():
             for number, request in enumerate(recording.requests):
-                for part in dict(request.out).values():
-                    self.writers.setdefault(Endpoint(name, part.port.name), []).append(number)
-
-    def numbers(self, name: str) -> range:
-        return range(len(self.recordings[name].requests))
+                for port in written_names(request):
+                    self.writers[Endpoint(name, port)].append(number)
 
     def waits(self, name: str, number: int) -> dict[_Step, _Cause]:
         """Return the steps that a step waits for, each with a cause."""
         found: dict[_Step, _Cause] = {}
-        recording = self.recordings[name]
-        request = recording.requests[number]
-        written = {part.port.name for _, part in request.out}
-        for target in (*request.reads, *(part for _, part in request.out)):
-            if not (isinstance(target, Part) and target.previous):
-                for key, cause in self._before(name, target, number):
-                    found.setdefault(key, cause)
+        requests = self.recordings[name].requests
+        for target in (*requests[number].reads, *(part for _, part in requests[number].out)):
+            for key, cause in self._before(name, part_of(target), number):
+                found.setdefault(key, cause)
+        written = written_names(requests[number])
         for earlier in range(number):  # reads a version that this step overwrites
-            for target in recording.requests[earlier].reads:
-                port = target.port if isinstance(target, Part) else target
-                if port.name in written and not (isinstance(target, Part) and target.previous):
-                    found.setdefault((name, earlier), (name, port.name, Endpoint(name, port.name)))
+            for part in map(part_of, requests[earlier].reads):
+                if part.port.name in written and not part.previous:
+                    found.setdefault((name, earlier), (name, part.port.name, Endpoint(name, part.port.name)))
         found.pop((name, number), None)
         return found
 
-    def _before(self, name: str, target: Port | Part, number: int | None) -> Iterator[tuple[_Step, _Cause]]:
+    def _before(self, name: str, part: Part, number: int | None) -> Iterator[tuple[_Step, _Cause]]:
         """Yield the steps that decide what a port holds before step `number` of its node; None: after all steps."""
-        port, only = (target.port, target.link) if isinstance(target, Part) else (target, None)
-        own = Endpoint(name, port.name)
+        port = part.port
+        if part.previous:
+            return
         if isinstance(port, Function):
             ports = self.graph[name].node.ports()
             for read_name, read in zip(port.read_names, port.reads, strict=True):
                 if not (isinstance(read, Part) and read.previous):
-                    yield from self._before(name, ports[read_name], number)
+                    yield from self._before(name, ports[read_name].whole, number)
             return
+        own = Endpoint(name, port.name)
         for earlier in self.writers.get(own, ()):
             if number is None or earlier < number:
                 yield (name, earlier), (name, port.name, own)
         links = self.recordings[name].links.get(port.name, ()) if isinstance(port, Input | InOut) else ()
         for at, end in enumerate(links):
-            source = follow_forwards(self.forwarded, end)
-            if end.previous or only not in (None, at) or source.node not in self.recordings:
+            source = self.follow(end)
+            if end.previous or part.link not in (None, at) or source.node not in self.recordings:
                 continue
-            for key, _ in self._before(source.node, self.graph[source.node].node.ports()[source.port], None):
+            for key, _ in self._before(source.node, self.graph[source.node].node.ports()[source.port].whole, None):
                 yield key, (name, port.name, end)
 
     def cycle(self, waits: Mapping[_Step, Mapping[_Step, _Cause]]) -> Problem:

@@ -13,12 +13,18 @@ from rendergraph.declare import Facts, Function, InOut, Input, Node, Part, Port,
 from rendergraph.declare.blame import author_problem
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Misuse, Problem, SceneError, is_interruption, node_named, suggestion
-from rendergraph.expand.model import OF_SCENE
 from rendergraph.glsl.source import needs
 from rendergraph.link import Endpoint, Graph, GraphNode
+from rendergraph.link.graph import depth_first
 from rendergraph.steps import MOST_STEPS, StepRequest, Steps, UniformValue, define_text
-from rendergraph.textures import BufferDesc, TextureDesc
+from rendergraph.textures import BufferDesc, EnvironmentMap, SceneData, Semantic, Signature, TextureDesc
 
+SCENE_DATA = Endpoint("", "the scene's data")
+OF_SCENE: Mapping[Semantic | Signature, Endpoint] = {
+    EnvironmentMap: Endpoint("", "the scene's environment"),
+    SceneData: SCENE_DATA,
+}
+"""The sources of inputs that read the scene, if the file does not link them."""
 _MOST_REQUESTS = 10 * MOST_STEPS
 """Maximum number of steps of one node, which might record endlessly."""
 
@@ -50,14 +56,9 @@ class Recording:
         self.uniforms = param_uniforms(node.node)
         self.includes = tuple([(name.upper(), file) for name, file in node.choices.items()])
 
-    @property
-    def facts(self) -> Facts:
-        return self._facts
-
     @cached_property
-    def _facts(self) -> Facts:
-        graph = self.graph
-        read = self.node.type.read
+    def facts(self) -> Facts:
+        graph, read = self.graph, self.node.type.read
         inputs = {
             name: graph.facts.of_scene(read[name].semantic)
             if ends[0] in OF_SCENE.values()
@@ -66,6 +67,23 @@ class Recording:
             if ends
         }
         return replace(graph.facts, inputs=inputs)
+
+    def run(self) -> str | None:
+        """Call the node's `record`; return why the node is idle if it only leaves its inputs as they are."""
+        node, ports = self.node, self.node.node.ports()
+        try:
+            _returns_nothing(node.node.record(Steps(ports, node.id, node.type.name, self)))  # type: ignore[func-returns-value]  # third-party nodes may
+        except InputError:
+            raise
+        except BaseException as error:  # anything that a node raises is its mistake
+            if is_interruption(error):
+                raise
+            raise InputError(_author_problem(node, error)) from error
+        if self.requests or not all(self.continues(ports[name]) for name in self.used_ports):
+            return None
+        if self.unfilled:
+            return f"the scene has no {self.unfilled[0]} objects: there is nothing to draw"
+        return "it recorded no step"
 
     def desc(self, port: Port) -> TextureDesc | BufferDesc:
         if isinstance(port, Input):
@@ -119,9 +137,8 @@ class Recording:
         labels = {one.options["label"]: one for one in self.requests if one.options.get("label")}
         if label not in labels:
             raise Misuse(f"if_drawn is '{label}', but no earlier step has that label{suggestion(label, labels)}")
-        named = [*request.bindings.values(), *(part for _, part in request.out)]
-        touched = {(target.port if isinstance(target, Part) else target).name for target in named}
-        if touched.isdisjoint(part.port.name for _, part in labels[label].out):
+        touched = {part_of(target).port.name for target in request.bindings.values()} | written_names(request)
+        if touched.isdisjoint(written_names(labels[label])):
             raise Misuse(f"if_drawn is '{label}', but it neither reads nor continues what that step writes")
 
     def continues(self, port: Port) -> bool:
@@ -133,12 +150,11 @@ class Recording:
         ports = self.node.node.ports()
         names: set[str] = set()
         for request in self.requests:
-            for target in request.reads:
-                port = target.port if isinstance(target, Part) else target
+            for port in [part_of(target).port for target in request.reads]:
                 names.add(port.name)
                 if isinstance(port, Function):
                     names.update(port.read_names)
-            names.update([part.port.name for _, part in request.out if isinstance(part.port, InOut)])
+            names.update([name for name in written_names(request) if isinstance(ports[name], InOut)])
             view = request.options.get("view")
             if isinstance(view, Input):
                 names.add(view.name)
@@ -151,6 +167,15 @@ class Recording:
             elif isinstance(used, InOut):  # whether or not a step writes it
                 names.add(name)
         return [end for name in names for end in self.links.get(name, ()) if end not in OF_SCENE.values()]
+
+
+def part_of(target: Port | Part) -> Part:
+    return target if isinstance(target, Part) else target.whole
+
+
+def written_names(request: StepRequest) -> set[str]:
+    """Return the names of the ports that a request writes."""
+    return {part.port.name for _, part in request.out}
 
 
 def is_kept(port: Port) -> bool:
@@ -171,15 +196,13 @@ def record_all(
 
 def _history_readers(graph: Graph, outputs: Mapping[str, Endpoint]) -> set[str]:
     """Return the nodes that read last frame's values and contribute to an output."""
-    history_readers = {node.id for node in graph.nodes for ends in node.inputs.values() for end in ends if end.previous}
-    reached: set[str] = set()
-    stack = [end.node for end in outputs.values()] if history_readers else []
-    while stack:
-        name = stack.pop()
-        if name not in reached:
-            reached.add(name)
-            stack += [end.node for ends in graph[name].inputs.values() for end in ends]
-    return history_readers & reached
+    ends = {node.id: [end for ends in node.inputs.values() for end in ends] for node in graph.nodes}
+    readers = {name for name, found in ends.items() if any(end.previous for end in found)}
+    if not readers:
+        return readers
+    sources = {name: [end.node for end in found] for name, found in ends.items()}
+    reached = depth_first(sources, [end.node for end in outputs.values()])
+    return readers.intersection(reached)
 
 
 def _record(
@@ -195,13 +218,14 @@ def _record(
     """
     demanded: dict[str, set[str]] = {name: set(demanded_before.get(name, ())) for name in order}
     told: dict[str, int] = {}
-    for end in outputs.values():
-        demanded[end.node].add(end.port)
+
+    def demand(ends: Iterable[Endpoint]) -> None:
+        for end in ends:
+            demanded[end.node].add(end.port)
+
+    demand(outputs.values())
     for name in history_readers:
-        for ends in graph[name].inputs.values():
-            for end in ends:
-                if end.previous:
-                    demanded[end.node].add(end.port)
+        demand(end for ends in graph[name].inputs.values() for end in ends if end.previous)
     recordings: dict[str, Recording] = {}
     idle: dict[str, str] = {}
     reached: set[str] = set()  # nodes that are demanded, and those that would be if their textures had layers
@@ -214,32 +238,15 @@ def _record(
             continue
         reached.add(name)
         reason = _why_idle(graph, node, used)
+        if not reason:
+            recording = Recording(graph, node, used)
+            reason = recording.run()
         if reason:
             idle[name] = reason
-            _forward_demand(node, used, demanded)
-            continue
-        recording = Recording(graph, node, used)
-        steps = Steps(node.node.ports(), name, node.type.name, recording)
-        try:
-            _returns_nothing(node.node.record(steps))  # type: ignore[func-returns-value]  # third-party nodes may
-        except InputError:
-            raise
-        except BaseException as error:  # anything that a node raises is its mistake
-            if is_interruption(error):
-                raise
-            raise InputError(_author_problem(node, error)) from error
-        ports = node.node.ports()
-        if not recording.requests and all(recording.continues(ports[port]) for port in used):
-            idle[name] = (
-                f"the scene has no {recording.unfilled[0]} objects: there is nothing to draw"
-                if recording.unfilled
-                else "it recorded no step"
-            )
-            _forward_demand(node, used, demanded)
-            continue
-        recordings[name] = recording
-        for end in recording.demands():
-            demanded[end.node].add(end.port)
+            demand(end for port in used for end in node.inputs.get(port, ()))
+        else:
+            recordings[name] = recording
+            demand(recording.demands())
     if graph.cyclic and any(len(demanded[name]) > count for name, count in told.items()):
         return _record(graph, order, outputs, history_readers, demanded)
     return {name: recordings[name] for name in order if name in recordings}, idle
@@ -269,12 +276,6 @@ def _why_empty(graph: Graph, node: GraphNode, name: str) -> str:
     kinds = Counter(light.type for light in graph.facts.lights)
     listed = " and ".join(f"{count} {kind}" for kind, count in kinds.items())
     return f"it uses none of the scene's lights ({listed})" if listed else "the scene has no light"
-
-
-def _forward_demand(node: GraphNode, used: set[str], demanded: Mapping[str, set[str]]) -> None:
-    for port in used:
-        for end in node.inputs.get(port, ()):
-            demanded[end.node].add(end.port)
 
 
 def _why_idle(graph: Graph, node: GraphNode, used: set[str]) -> str | None:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from rendergraph.declare import Function, History, InOut, Input, Internal, Node, Part, Port, Views, WrittenPort
 from rendergraph.errors import InputError
-from rendergraph.expand.model import CAMERA, OF_SCENE, SCENE_DATA, VersionedSteps, ViewTable, follow_forwards
-from rendergraph.expand.recording import Recording, is_kept
+from rendergraph.expand.recording import OF_SCENE, SCENE_DATA, Recording, is_kept, part_of
 from rendergraph.expand.targets import overlap, parts_written, refusals, target_size
 from rendergraph.link import Endpoint, Graph
+from rendergraph.link.infer import CAMERA
 from rendergraph.steps import (
     BUFFER_OPTIONS,
     FunctionBinding,
@@ -36,12 +37,23 @@ _COPIED_OPTIONS = frozenset(
 _PLAIN = Sampler()
 
 
-def assign_versions(graph: Graph, recordings: Mapping[str, Recording], idle: Mapping[str, str]) -> VersionedSteps:
-    return _VersionAssignment(graph, recordings, idle).run()
+class ViewTable(Struct, frozen=True):
+    """A table of views: their count, and each view's light index in the scene (empty unless they are lights' views)."""
+
+    count: int = 1
+    lights: tuple[int, ...] = ()
 
 
-class _VersionAssignment:
-    """`version` is each resource's newest version; `written` has its written parts: mip, and layer or None for all."""
+class VersionAssignment:
+    """Turns recordings into steps with resources and versions in place of ports.
+
+    Attributes:
+        version: resource id to its newest version.
+        written: resource id to its written parts: mip, and layer or None for all.
+        final: port to its resource and the resource's version after its node.
+        forwarded: port of an idle node to the port that it would continue: without the node, the texture is unchanged.
+        firsts: resource id to the first frame's value, if a node that continues it declares one.
+    """
 
     def __init__(self, graph: Graph, recordings: Mapping[str, Recording], idle: Mapping[str, str]) -> None:
         self.graph = graph
@@ -59,19 +71,28 @@ class _VersionAssignment:
                 self.final[end] = end.port, 0
         self.views: dict[str, ViewTable] = {CAMERA: ViewTable()}
         self.steps: list[Step] = []
-        self.forwarded = dict(_forwarded_ports(graph, recordings))
+        self.forwarded = {
+            Endpoint(node.id, name): node.inputs[name][0].now
+            for node in graph.nodes
+            for name, port in (node.node.ports().items() if node.id not in recordings else ())
+            if isinstance(port, InOut) and node.inputs.get(name)
+        }
         self.firsts: dict[str, float] = {}
 
-    def run(self) -> VersionedSteps:
+    def follow(self, end: Endpoint) -> Endpoint:
+        """Return the port of this frame that a link leads to: idle nodes forward the input they would continue."""
+        end = end.now
+        while end in self.forwarded:
+            end = self.forwarded[end]
+        return end
+
+    def run(self) -> None:
         if self.graph.cyclic:
             self._by_step()
         else:
             for recording in self.recordings.values():
                 self._node(recording)
         self._check_buffers()
-        return VersionedSteps(
-            self.steps, self.resources, self.version, self.final, self.forwarded, self.firsts, self.idle, self.views
-        )
 
     def _check_buffers(self) -> None:
         """Refuse reads of buffers that nothing writes, neither a step nor `update`."""
@@ -109,7 +130,7 @@ class _VersionAssignment:
 
         for recording in self.recordings.values():
             self._declare(recording)
-        for name, number in step_order(self.graph, self.recordings, self.forwarded):
+        for name, number in step_order(self):
             recording = self.recordings[name]
             self.steps.append(self._step(recording, recording.requests[number], number))
         for recording in self.recordings.values():
@@ -123,7 +144,7 @@ class _VersionAssignment:
         if found is None and self.graph.cyclic and end.node in self.recordings:
             links = self.recordings[end.node].links.get(end.port)
             if links and end in self.recordings[end.node].own.values():
-                found = self._final(follow_forwards(self.forwarded, links[0]))
+                found = self._final(self.follow(links[0]))
                 if found is not None:
                     self.final[end] = found
         return found
@@ -140,7 +161,7 @@ class _VersionAssignment:
             if end in self.graph.empty:
                 continue
             if isinstance(made, InOut) and recording.links.get(name):
-                before = follow_forwards(self.forwarded, recording.links[name][0])
+                before = self.follow(recording.links[name][0])
                 if self.graph.cyclic:
                     continue  # deferred until a step needs it: its source is not written yet
                 if before in self.final:  # otherwise no step that runs touches it
@@ -170,16 +191,17 @@ class _VersionAssignment:
         functions: list[FunctionBinding] = []
         called: set[str] = set()
         for name, target in request.bindings.items():
-            part = target if isinstance(target, Part) else target.whole
+            part = part_of(target)
             port = part.port
             if isinstance(port, Function):
-                functions.append(self._binding(recording, port))
+                functions.append(self._binding(recording, port.name))
             elif not isinstance(port, Input) or port.kind not in ("function", "view"):
                 reads += self._reads(recording, name, part)
             elif port.kind == "function":
-                provided = [f for end in recording.links.get(port.name, ()) for f in self._function(end)]
-                functions += provided
-                called |= {name} if provided else set()
+                # A node that has nothing to read is not recorded, and the function here is neutral.
+                ends = [end for end in recording.links.get(port.name, ()) if end.node in self.recordings]
+                functions += [self._binding(self.recordings[end.node], end.port) for end in ends]
+                called |= {name} if ends else set()
         writes: list[Write] = []
         for name, part in request.out:
             read, write = self._write(recording, request, name, part, options.get("value"))
@@ -188,8 +210,11 @@ class _VersionAssignment:
         all_reads = [*reads, *[read for f in functions for read in f.reads]]
         for code, text in refusals(request, self.resources, writes, all_reads):
             raise self._refused(recording, request, code, text)  # while the author's call is known
-        view, view_index = self._view(recording, request, options)
-        self._carry_view(writes, view if request.kind == "geometry" else None)
+        view, view_index = self._view(recording, request)
+        for write in writes if view is not None and request.kind == "geometry" else ():
+            resource = self.resources[write.resource]
+            if resource.view is None:
+                self.resources[write.resource] = replace(resource, view=view)
         size, samples = target_size(self.resources, writes, reads)
         counts = {name: options[name] for name in BUFFER_OPTIONS if options.get(name) is not None}
         for name, port in counts.items():
@@ -228,14 +253,9 @@ class _VersionAssignment:
         if isinstance(port, Input):
             ends = recording.links.get(port.name, ())
             sampler = part.sampler or recording.node.samplers.get(port.name, _PLAIN)
+            use, several = part.use or port.use, port.many and part.link is None
             return [
-                self._read(
-                    f"{name}_{number}" if port.many and part.link is None else name,
-                    end,
-                    part,
-                    sampler,
-                    part.use or port.use,
-                )
+                self._read(f"{name}_{number}" if several else name, end, part, sampler, use)
                 for number, end in enumerate(ends)
                 if part.link in (None, number)
             ]
@@ -247,7 +267,7 @@ class _VersionAssignment:
     def _read(
         self, name: str, end: Endpoint, part: Part, sampler: Sampler, use: Use, version: int | None = None
     ) -> Read:
-        resource, final = self._final(follow_forwards(self.forwarded, end)) or (str(self._maker(end)), 0)
+        resource, final = self._final(self.follow(end)) or (str(self._maker(end)), 0)
         port = self.graph[end.node].node.ports()[end.port] if end.previous else None
         if isinstance(port, InOut) and port.first is not None:
             self.firsts[resource] = port.first  # declared by the node that continues the texture
@@ -281,7 +301,7 @@ class _VersionAssignment:
         clear = recording.node.clears[port.name]
         if request.kind == "clear":
             load, clear = "clear", value
-        elif not fresh:
+        elif request.kind == "mipmaps" or not fresh:
             load = "load"
         else:
             load = "discard" if clear is None else "clear"
@@ -300,7 +320,6 @@ class _VersionAssignment:
             read = [Read(name, resource, 0, "attach")]  # what `update` wrote before the frame must still be there
         if request.kind == "mipmaps":
             read = [Read(name, resource, old, "attach")]
-            load = "load"
         value = 0.0 if clear is None else clear
         write = Write(name, resource, old + 1, use, load, value, part.mip, part.layer)  # type: ignore[arg-type]
         return read, write
@@ -310,12 +329,10 @@ class _VersionAssignment:
         step = Step(node.id, 0, request.kind, type=node.type.name, where=Where(node.place, request.caller))
         return InputError(step.problem(code, text))
 
-    def _view(
-        self, recording: Recording, request: StepRequest, options: Mapping[str, Any]
-    ) -> tuple[str | None, int | None]:
+    def _view(self, recording: Recording, request: StepRequest) -> tuple[str | None, int | None]:
         if request.kind not in ("geometry", "draw"):
             return None, None
-        port, index = options.get("view"), options.get("view_index", 0)
+        port, index = request.options.get("view"), request.options.get("view_index", 0)
         if isinstance(port, Views):
             table = str(Endpoint(recording.node.id, port.name))
             count = self.views[table].count
@@ -332,24 +349,11 @@ class _VersionAssignment:
             return (self.graph.textures[ends[0].now].view if ends else None) or CAMERA, index
         return (str(ends[0]) if ends else CAMERA), index
 
-    def _carry_view(self, writes: Iterable[Write], view: str | None) -> None:
-        for write in writes:
-            resource = self.resources[write.resource]
-            if view is not None and resource.view is None:
-                self.resources[write.resource] = replace(resource, view=view)
-
-    def _function(self, end: Endpoint) -> list[FunctionBinding]:
-        recording = self.recordings.get(end.node)
-        if recording is None:
-            return []  # it has nothing to read, so the consumer's function is neutral
-        port = recording.node.node.ports()[end.port]
-        assert isinstance(port, Function)
-        return [self._binding(recording, port)]
-
-    def _binding(self, recording: Recording, port: Function) -> FunctionBinding:
-        node = recording.node
-        reads = []
+    def _binding(self, recording: Recording, function: str) -> FunctionBinding:
+        node, reads = recording.node, []
         ports = node.node.ports()
+        port = ports[function]
+        assert isinstance(port, Function)
         for name, read in zip(port.read_names, port.reads, strict=True):
             source = ports[name]
             if isinstance(source, Input) and not recording.links.get(name):
@@ -394,15 +398,5 @@ def _use_macros(
 
 def _condition_step(recording: Recording, label: str, index: int) -> int | None:
     """Return the number of the last earlier step with a label; None without a label."""
-    if not label:
-        return None
-    numbers = [i for i, one in enumerate(recording.requests[:index]) if one.options.get("label") == label]
-    return numbers[-1] if numbers else None
-
-
-def _forwarded_ports(graph: Graph, recordings: Mapping[str, Recording]) -> Iterator[tuple[Endpoint, Endpoint]]:
-    """Map ports of idle nodes to the inputs that they would continue: without the node, the texture is unchanged."""
-    for node in graph.nodes:
-        for name, port in node.node.ports().items() if node.id not in recordings else ():
-            if isinstance(port, InOut) and node.inputs.get(name):
-                yield Endpoint(node.id, name), node.inputs[name][0].now
+    earlier = reversed(range(index)) if label else ()
+    return next((number for number in earlier if recording.requests[number].options.get("label") == label), None)

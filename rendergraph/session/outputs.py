@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from rendergraph.errors import InputError, Problem, suggestion
-from rendergraph.expand.model import OF_SCENE
+from rendergraph.expand import OF_SCENE
 from rendergraph.link import Graph, endpoint
 from rendergraph.session.selection import TEXTURE_PART, RenderOptions
 from rendergraph.session.values import OutputRequest, Planned
