@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from msgspec import Struct
+from msgspec.structs import replace
 
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.declare import CameraFacts, Facts, LightFacts, MaterialFacts, TextureInfo
+from rendergraph.declare import CameraFacts, Facts, Input, LightFacts, MaterialFacts, TextureInfo
 from rendergraph.document import Value
 from rendergraph.errors import InputError, Option, Problem, suggestion
 from rendergraph.facts import ObjectFacts, SceneDataFacts
 from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.link.check import Checker, port_kind
-from rendergraph.link.connect import Connector
 from rendergraph.link.graph import Endpoint, Graph, GraphNode, upstream_first
-from rendergraph.link.infer import TextureInference, output_ends
-from rendergraph.link.instances import choice_files, instance
+from rendergraph.link.infer import TextureInference
+from rendergraph.link.instances import choice_files, instance, stand_in, unknown_type
 from rendergraph.link.nodes import (
+    Connector,
     Link,
     References,
     UnlinkedNode,
@@ -49,9 +49,9 @@ def link(
         objects: the scene's objects; None without a scene, where any may exist.
         scene_data: called if a node reads the scene's data, with whether rays are traced in it.
     """
-    given = None if objects is None else tuple(objects)
-    scene = environment, scene_data, tuple(materials), camera
-    return _Linker(spec, spec.catalog or catalog, tuple(lights), given, *scene).graph()
+    given, made_of = tuple(objects or ()), tuple(materials)
+    facts = Facts(spec.size, tuple(lights), objects=given, environment=environment, materials=made_of, camera=camera)
+    return _Linker(spec, catalog, facts, objects is not None, scene_data).graph()
 
 
 def sketch(
@@ -61,7 +61,7 @@ def sketch(
     try:
         return link(spec, catalog, lights, environment=environment), ()
     except InputError as error:
-        linker = _Linker(spec, spec.catalog or catalog, tuple(lights), None, environment, sketching=True)
+        linker = _Linker(spec, catalog, Facts(spec.size, tuple(lights), environment=environment), sketching=True)
         graph = linker.graph()
         lacking = {*linker.missing, *(problem for problem in spec.problems if problem.code == "RG130")}
         if any(problem not in lacking for problem in error.problems):
@@ -80,10 +80,9 @@ def fitting(
 
     A file with mistakes is linked as far as possible.
     """
-    given = None if objects is None else tuple(objects)
-    linker = _Linker(spec, spec.catalog or catalog, tuple(lights), given, environment, sketching=True)
-    graph = linker.graph()
-    checker = linker.checker
+    facts = Facts(spec.size, tuple(lights), objects=tuple(objects or ()), environment=environment)
+    linker = _Linker(spec, catalog, facts, objects is not None, sketching=True)
+    graph, checker = linker.graph(), linker.checker
     ends = {str(end): end for end in checker.textures if end.port in checker.nodes[end.node].type.cls.outputs()}
     ends |= {name: end for name, end in graph.aliases.items() if end in checker.textures}
     found: dict[str, dict[str, list[str]]] = {}
@@ -130,74 +129,70 @@ def endpoint(graph: Graph, text: str) -> Endpoint:
     return found
 
 
-class _Linker(Struct, eq=False):
-    """Links one pipeline; `missing` holds the problems about types that are missing or cannot be used."""
+class _Linker:
+    """Links one pipeline.
 
-    spec: PipelineSpec
-    catalog: Catalog
-    lights: tuple[LightFacts, ...]
-    objects: tuple[ObjectFacts, ...] | None
-    environment: TextureDesc | None
-    scene_data: Callable[[bool], SceneDataFacts] = lambda rays: SceneDataFacts()
-    materials: tuple[MaterialFacts, ...] = ()
-    camera: CameraFacts = CameraFacts()
-    sketching: bool = False
-    missing: list[Problem] = []
-    problems: list[Problem] = []
-    warnings: list[Problem] = []
-    checked: Checker | None = None
+    Attributes:
+        missing: problems about types that are missing or cannot be used.
+        written: nodes by id as in the file.
+        nodes: those that remain without the removed ones, whose links are bypassed.
+    """
 
-    @property
-    def checker(self) -> Checker:
-        assert self.checked is not None  # `graph` has been called
-        return self.checked
+    def __init__(
+        self,
+        spec: PipelineSpec,
+        catalog: Catalog,
+        facts: Facts,
+        knows_objects: bool = False,
+        scene_data: Callable[[bool], SceneDataFacts] = lambda rays: SceneDataFacts(),
+        sketching: bool = False,
+    ) -> None:
+        self.spec, self.catalog = spec, spec.catalog or catalog
+        self.knows_objects, self.sketching = knows_objects, sketching
+        self.missing: list[Problem] = []
+        self.problems: list[Problem] = []
+        self.warnings: list[Problem] = []
+        self.types = self._types()
+        self.references = References(spec, self.types)
+        self.written = {id: self._bind(node) for id, node in spec.nodes.items() if id in self.types}
+        connector = Connector(spec, self.catalog, self.references, self._report)
+        for draft in self.written.values():
+            connector.connect(draft)
+        if facts.environment is None:
+            mark_without_environment(self.written)
+        self.nodes = remove_disabled(self.written, self.references)
+        for draft in self.nodes.values():
+            connector.complete(draft, self.written)
+        self.outputs = self._outputs()
+        scenes = [port for draft in self.nodes.values() for port in draft.inputs.values() if port.kind == "scene"]
+        if scenes:
+            facts = replace(facts, scene_data=scene_data(any(getattr(port, "rays", False) for port in scenes)))
+        used = {found.source for found in self.outputs.values()}
+        used |= {end.source for draft in self.nodes.values() for links in draft.links.values() for end in links}
+        self.infer = TextureInference(self.nodes, facts, used)
 
     def graph(self) -> Graph:
-        types = self._types()
-        references = References(self.spec, types)
-        nodes = {node.id: self._bind(node, types[node.id]) for node in self.spec.nodes.values() if node.id in types}
-        connector = Connector(self.spec, self.catalog, references, self._report)
-        for draft in nodes.values():
-            connector.connect(draft)
-        if self.environment is None:
-            mark_without_environment(nodes)
-        written, nodes = nodes, remove_disabled(nodes, references)
-        for draft in nodes.values():
-            connector.complete(draft, written)
-        outputs = self._outputs(references, written)
+        nodes, infer = self.nodes, self.infer
         order = upstream_first(sources(nodes))
-        cyclic = cycles(nodes) if len(order) < len(nodes) else []
-        used = {end.source for draft in nodes.values() for links in draft.links.values() for end in links}
-        used |= {found.source for found in outputs.values()}
-        scenes = [port for draft in nodes.values() for port in draft.inputs.values() if port.kind == "scene"]
-        facts = Facts(
-            self.spec.size,
-            self.lights,
-            objects=self.objects or (),
-            environment=self.environment,
-            scene_data=self.scene_data(any(getattr(port, "rays", False) for port in scenes)) if scenes else None,
-            materials=self.materials,
-            camera=self.camera,
-        )
-        infer = TextureInference(nodes, facts, used)
-        textures: dict[Endpoint, TextureInfo] = {}
-        overwritten: Mapping[tuple[str, str], Problem] = {}
-        if len(order) < len(nodes):
+        has_cycle = len(order) < len(nodes)  # of nodes, though their steps may form none
+        cyclic = cycles(nodes) if has_cycle else []
+        if has_cycle:
             infer.before = Ancestors(nodes)
-        if cyclic:
-            self.problems += cyclic
-            if self.sketching:
-                textures = self._textures(list(nodes), nodes, infer)
-                self.checked = Checker(nodes, textures, infer, self.catalog)
-        else:
+        overwritten: Mapping[tuple[str, str], Problem] = {}
+        self.problems += cyclic
+        if not cyclic:
             found, overwritten = versions(nodes)
-            self.problems += needs(nodes, outputs, written) + found
-            self._check_subgraph_inputs(nodes, infer)
-            self._warn_of_unused_settings(nodes)
-            textures = self._textures(dict.fromkeys([*order, *nodes]), nodes, infer)
-            self.checked = Checker(nodes, textures, infer, self.catalog)
-            self.problems += self.checked.check()
-            self._check_outputs(nodes, outputs, infer)
+            self.problems += needs(nodes, self.outputs, self.written) + found
+            self._check_subgraph_inputs()
+            self._warn_of_unused_settings()
+        textures: dict[Endpoint, TextureInfo] = {}
+        if not cyclic or self.sketching:
+            textures = self._textures(nodes if cyclic else dict.fromkeys([*order, *nodes]))
+            self.checker = Checker(nodes, textures, infer, self.catalog)
+        if not cyclic:
+            self.problems += self.checker.check()
+            self._check_outputs()
+        type_warnings = dict.fromkeys(warning for one in self.types.values() for warning in one.warnings)
         members = {name: _member(draft, infer) for name, draft in nodes.items()}
         self.problems += infer.problems if not cyclic else ()
         problems = [*self.spec.problems, *self.problems]
@@ -206,16 +201,16 @@ class _Linker(Struct, eq=False):
         return Graph(
             name=self.spec.name,
             members=members,
-            outputs={name: found.source for name, found in outputs.items()},
-            facts=facts,
+            outputs={name: found.source for name, found in self.outputs.items()},
+            facts=infer.scene,
             textures=textures,
-            aliases=self._aliases(references, written),
-            disabled=tuple(name for name, draft in written.items() if draft.spec.disabled is not None),
-            knows_objects=self.objects is not None,
-            unlit=tuple(name for name, draft in written.items() if draft.unlit),
+            aliases=self._aliases(),
+            disabled=tuple(name for name, draft in self.written.items() if draft.spec.disabled is not None),
+            knows_objects=self.knows_objects,
+            unlit=tuple(name for name, draft in self.written.items() if draft.unlit),
             overwritten=overwritten,
-            cyclic=_links(nodes) if len(order) < len(nodes) else {},
-            warnings=(*dict.fromkeys(warning for one in types.values() for warning in one.warnings), *self.warnings),
+            cyclic=_links(nodes) if has_cycle else {},
+            warnings=(*type_warnings, *self.warnings),
         )
 
     def _report(self, problem: Problem) -> None:
@@ -232,24 +227,19 @@ class _Linker(Struct, eq=False):
                 continue  # reported by `resolve`
             try:
                 if node.type not in self.catalog:
-                    from rendergraph.link.instances import unknown_type  # only for missing types
-
                     raise InputError(value.problem("RG102", unknown_type(self.spec, self.catalog, node.type)))
                 found[node.id] = self.catalog.get(node.type)
             except InputError as error:
                 self.missing += error.problems
-                if node.type not in failed or node.type not in self.catalog:
-                    self.problems += error.problems
+                for problem in error.problems if node.type not in failed or node.type not in self.catalog else ():
+                    self._report(problem)
                 failed.add(node.type)
                 if self.sketching:
-                    from rendergraph.link.instances import stand_in  # only for missing types
-
                     found[node.id] = stand_in(self.spec, node)
-                elif len(self.problems) >= MOST_PROBLEMS:
-                    raise InputError(_in_order([*self.spec.problems, *self.problems])) from None
         return found
 
-    def _bind(self, spec: NodeSpec, node_type: NodeType) -> UnlinkedNode:
+    def _bind(self, spec: NodeSpec) -> UnlinkedNode:
+        node_type = self.types[spec.id]
         node, problems = instance(spec, node_type, self.spec.source_roots)
         choices, wrong = choice_files(spec, node_type, node, self.catalog.extensions)
         self.missing += wrong if self.spec.missing else ()
@@ -258,56 +248,46 @@ class _Linker(Struct, eq=False):
         ports, inputs = node_type.cls.ports(), node_type.cls.inputs()
         return UnlinkedNode(spec, node_type, node, ports, inputs, {name: [] for name in inputs}, set(), choices)
 
-    def _outputs(self, references: References, written: Mapping[str, UnlinkedNode]) -> dict[str, Link]:
+    def _outputs(self) -> dict[str, Link]:
         found: dict[str, Link] = {}
         for name, value in self.spec.outputs.items():
             try:
-                followed = references.follow("", value, name)
+                followed = self.references.follow("", value, name)
             except InputError as error:
                 for problem in error.problems:
                     self._report(problem)
                 continue
             if followed is None:
                 continue
-            led = bypass(followed, written, references)
-            if not written[led.source.node].is_removed:
+            led = bypass(followed, self.written, self.references)
+            if not self.written[led.source.node].is_removed:
                 found[name] = led
             else:
-                self._report(missing_source(f"output '{name}' shows '{led.source}'", led, written))
+                self._report(missing_source(f"output '{name}' shows '{led.source}'", led, self.written))
         return found
 
-    def _textures(
-        self, order: Iterable[str], nodes: Mapping[str, UnlinkedNode], infer: TextureInference
-    ) -> dict[Endpoint, TextureInfo]:
+    def _textures(self, order: Iterable[str]) -> dict[Endpoint, TextureInfo]:
         """Return the properties of all ports; in this order, rules rarely recurse upstream."""
-        textures: dict[Endpoint, TextureInfo] = {}
-        for name in order:
-            for end in output_ends(nodes[name]):
-                info = infer.info(end)
-                if info is not None:
-                    textures[end] = info
-        return textures
+        ports = [(id, name, port) for id in order for name, port in self.nodes[id].ports.items()]
+        ends = [Endpoint(id, name) for id, name, port in ports if not isinstance(port, Input)]
+        return {end: info for end in ends if (info := self.infer.info(end)) is not None}
 
-    def _check_subgraph_inputs(self, nodes: Mapping[str, UnlinkedNode], infer: TextureInference) -> None:
+    def _check_subgraph_inputs(self) -> None:
         """Check links into sub-pipelines against their declarations; wrong ones are cut and reported only here."""
-        for draft in nodes.values() if self.spec.scopes else ():
+        for draft in self.nodes.values() if self.spec.scopes else ():
             for name, links in draft.links.items():
                 for found in [found for found in links if found.declared]:
-                    info = infer.info(found.source)
-                    problem = (
-                        self._subgraph_input_problem(nodes, found, info.semantic.name) if info is not None else None
-                    )
+                    info = self.infer.info(found.source)
+                    problem = self._subgraph_input_problem(found, info.semantic.name) if info is not None else None
                     if problem is not None:
                         self._report(problem)
                         links.remove(found)
                         draft.failed.add(name)
 
-    def _subgraph_input_problem(self, nodes: Mapping[str, UnlinkedNode], found: Link, carried: str) -> Problem | None:
-        for entered in found.declared:
-            if entered.semantic is not None and "any" not in (entered.semantic, carried):
-                if entered.semantic == carried:
-                    continue
-                where = line_of(nodes[found.source.node].spec.place, entered.given.place)
+    def _subgraph_input_problem(self, found: Link, carried: str) -> Problem | None:
+        for entered in found.declared if carried != "any" else ():
+            if entered.semantic not in (None, "any", carried):
+                where = line_of(self.nodes[found.source.node].spec.place, entered.given.place)
                 text = f"'{entered.name}' expects {entered.semantic}, but '{found.source}' ({where}) is {carried}"
                 added = [added.value for added in self.catalog.extensions.semantics()]
                 known = [semantic.name for semantic in (*SEMANTICS, *added)]
@@ -315,16 +295,14 @@ class _Linker(Struct, eq=False):
                 return entered.given.problem("RG110", text)
         return None
 
-    def _check_outputs(
-        self, nodes: Mapping[str, UnlinkedNode], outputs: Mapping[str, Link], infer: TextureInference
-    ) -> None:
-        for name, found in outputs.items():
-            info = infer.info(found.source)
+    def _check_outputs(self) -> None:
+        for name, found in self.outputs.items():
+            info = self.infer.info(found.source)
             if found.source.previous:
                 text = f"output '{name}' shows this frame; remove '@previous'"
                 self._report(found.value.problem("RG127", text))
             elif info is not None:
-                kind = port_kind(nodes[found.source.node].ports[found.source.port], info)
+                kind = port_kind(self.nodes[found.source.node].ports[found.source.port], info)
                 if kind not in TEXTURE_KINDS:
                     text = f"output '{name}' shows a texture, but '{found.source}' is a {kind}"
                     self._report(found.value.problem("RG129", text))
@@ -335,9 +313,9 @@ class _Linker(Struct, eq=False):
                     )
                     self.warnings.append(found.value.problem("RG154", text).as_warning())
 
-    def _warn_of_unused_settings(self, nodes: Mapping[str, UnlinkedNode]) -> None:
+    def _warn_of_unused_settings(self) -> None:
         """Warn only about settings that were typed: the parameters of a file may be meant for other scenes."""
-        for draft in nodes.values():
+        for draft in self.nodes.values():
             for name, value in draft.spec.params.items():
                 parameter = draft.type.cls.parameters().get(name) if value.source.path is None else None
                 if parameter is None or not draft.links.get(parameter.unless):
@@ -346,19 +324,19 @@ class _Linker(Struct, eq=False):
                 text = f"'{path}' changes nothing: '{place}' replaces it; -s {place}=null disconnects that"
                 self.warnings.append(value.problem("RG155", text).as_warning())
 
-    def _aliases(self, references: References, written: Mapping[str, UnlinkedNode]) -> dict[str, Endpoint]:
+    def _aliases(self) -> dict[str, Endpoint]:
         found: dict[str, Link] = {}
         for scope, inner in self.spec.scopes.items():
             for name, value in inner.outputs.items():
-                followed = references.follow(scope, value, name)
+                followed = self.references.follow(scope, value, name)
                 if followed is not None:
                     found[f"{scope[:-1]}.{name}"] = followed
-        for draft in written.values():
+        for draft in self.written.values():
             for name in draft.type.cls.outputs() if draft.is_removed else ():
                 end = Endpoint(draft.spec.id, name)
                 found[str(end)] = Link(end, draft.spec.value)
-        led = {name: bypass(link, written, references).source for name, link in found.items()}
-        return {name: end for name, end in led.items() if not written[end.node].is_removed}
+        led = {name: bypass(link, self.written, self.references).source for name, link in found.items()}
+        return {name: end for name, end in led.items() if not self.written[end.node].is_removed}
 
 
 def _member(draft: UnlinkedNode, infer: TextureInference) -> GraphNode:

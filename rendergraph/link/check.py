@@ -176,15 +176,20 @@ def _semantics(wanted: Semantic | Signature | None, given: Semantic) -> _Mismatc
         code, expected, name = "RG203", f"{wanted.encoding} {wanted.name}", f"{given.encoding} {given.name}"
     else:
         return None
-    return (
-        code,
-        f"expects {expected}",
-        f"is {name}",
-        lambda cls: (
-            any(_means(port, given) for port in _only_input(cls))
-            and any(_means(port, wanted) for port in _outputs(cls))
-        ),
-    )
+    converts = _converting(lambda port: _means(port, given), lambda out, _: _means(out, wanted))
+    return code, f"expects {expected}", f"is {name}", converts
+
+
+def _converting(takes: Callable[[Input], bool], makes: Callable[[WrittenPort, Input], bool]) -> Accepts:
+    """Accept node types that can be inserted between two nodes: they take the source and make what is expected."""
+
+    def accepts(cls: type[Node]) -> bool:
+        needed = [port for port in cls.inputs().values() if not port.optional]
+        if len(needed) != 1 or not isinstance(port := needed[0], Input) or not takes(port):
+            return False
+        return any(makes(out, port) for out in cls.outputs().values() if isinstance(out, Output))
+
+    return accepts
 
 
 def _samples(port: Input, info: TextureInfo, samples: int) -> Iterator[_Mismatch]:
@@ -197,27 +202,25 @@ def _samples(port: Input, info: TextureInfo, samples: int) -> Iterator[_Mismatch
 def _by_kind(info: TextureInfo, kind: str, port: Input | InOut) -> Accepts:
     given = info.desc.kind if info.desc is not None else ""
     meant = port.semantic if isinstance(port.semantic, Semantic) else info.semantic
-    return lambda cls: (
-        any(p.kind == given and _means(p, info.semantic) for p in _only_input(cls))
-        and any(p.kind == kind and _means(p, meant) for p in _outputs(cls))
+    return _converting(
+        lambda port: port.kind == given and _means(port, info.semantic),
+        lambda out, _: out.kind == kind and _means(out, meant),
     )
 
 
 def _resolving(info: TextureInfo) -> Accepts:
-    return lambda cls: any(
-        port.samples != "single"
-        and _means(port, info.semantic, any_too=True)
-        and any(_continues(out, port, info) and _is_single(out) for out in _outputs(cls))
-        for port in _only_input(cls)
+    return _converting(
+        lambda port: port.samples != "single" and _means(port, info.semantic, any_too=True),
+        lambda out, port: (
+            _continues(out, port, info) and (out.samples == 1 or (out.samples is None and out.like is None))
+        ),
     )
 
 
 def _resizing(info: TextureInfo) -> Accepts:
-    return lambda cls: any(
-        port.size == "any"
-        and _means(port, info.semantic, any_too=True)
-        and any(_continues(out, port, info) and out.like is None and out.size in (None, 1.0) for out in _outputs(cls))
-        for port in _only_input(cls)
+    return _converting(
+        lambda port: port.size == "any" and _means(port, info.semantic, any_too=True),
+        lambda out, port: _continues(out, port, info) and out.like is None and out.size in (None, 1.0),
     )
 
 
@@ -237,16 +240,6 @@ def port_kind(port: Port, info: TextureInfo) -> str:
     return port.kind if isinstance(port, WrittenPort) else ""
 
 
-def _only_input(cls: type[Node]) -> list[Input]:
-    """The input of a type that needs no other: such a node can be inserted between two."""
-    needed = [port for port in cls.inputs().values() if not port.optional]
-    return [port for port in needed if isinstance(port, Input)] if len(needed) == 1 else []
-
-
-def _outputs(cls: type[Node]) -> Iterator[WrittenPort]:
-    return (port for port in cls.outputs().values() if isinstance(port, Output))
-
-
 def _means(port: Any, semantic: Semantic, *, any_too: bool = False) -> bool:
     own = port.semantic
     if not isinstance(own, Semantic):
@@ -258,10 +251,6 @@ def _means(port: Any, semantic: Semantic, *, any_too: bool = False) -> bool:
 
 def _continues(out: WrittenPort, port: Input, info: TextureInfo) -> bool:
     return out.like == port.name or (out.semantic is not None and _means(out, info.semantic, any_too=True))
-
-
-def _is_single(out: WrittenPort) -> bool:
-    return out.samples == 1 or (out.samples is None and out.like is None)
 
 
 def _size(size: Iterable[int]) -> str:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import Annotated, Any, NoReturn, Optional
 
-import msgspec
+from msgspec.structs import replace
 
 from rendergraph import textures
 from rendergraph.declare import Facts, Function, InOut, Input, Node, Port, TextureInfo, Views, WrittenPort
@@ -116,21 +117,17 @@ class TextureInference:
             return port.sampler
         end = Endpoint(draft.spec.id, port.name)
         if end not in self._samplers:
-            try:
+            smooth: Filter = "nearest"
+            with suppress(_Unknown):
                 smooth = self._checked_value(end, "filter", port.filter, Filter)
-            except _Unknown:
-                smooth = "nearest"
             self._samplers[end] = port.sampler_of(smooth)
         return self._samplers[end]
 
     def clear(self, draft: UnlinkedNode, port: WrittenPort) -> Texel | None:
         """Return the initial contents of a texture or buffer; None where they are undefined or the rule fails."""
-        if not callable(port.clear):
-            return port.clear
-        try:
-            value: Texel | None = self._checked_value(Endpoint(draft.spec.id, port.name), "clear", port.clear, _TEXEL)
-        except _Unknown:
-            return None
+        value: Texel | None = None
+        with suppress(_Unknown):
+            value = self._checked_value(Endpoint(draft.spec.id, port.name), "clear", port.clear, _TEXEL)
         return value
 
     def _checked_value(self, end: Endpoint, what: str, rule: Any, annotation: Any, code: str = "RG209") -> Any:
@@ -172,11 +169,9 @@ class TextureInference:
         return self._made(end, draft, port) if isinstance(port, WrittenPort) else None
 
     def _facts_of(self, draft: UnlinkedNode) -> Facts:
-        found = self._facts.get(draft.spec.id)
-        if found is None:
-            found = msgspec.structs.replace(self.scene, inputs=_LazyInputs(self, draft))
-            self._facts[draft.spec.id] = found
-        return found
+        if draft.spec.id not in self._facts:
+            self._facts[draft.spec.id] = replace(self.scene, inputs=_LazyInputs(self, draft))
+        return self._facts[draft.spec.id]
 
     def _rule_value(self, end: Endpoint, what: str, rule: Callable[[Node, Facts], Any]) -> Any:
         """Return the result of a rule; ports that share a function share its result."""
@@ -356,9 +351,3 @@ class TextureInference:
         if source is not None:
             return source.view, source.lights
         return (CAMERA if port.kind == "view" else None), ()
-
-
-def output_ends(draft: UnlinkedNode) -> Iterator[Endpoint]:
-    for name, port in draft.ports.items():
-        if not isinstance(port, Input):
-            yield Endpoint(draft.spec.id, name)

@@ -151,9 +151,8 @@ def unknown_type(spec: PipelineSpec, catalog: Catalog, name: str) -> str:
         return f"node type '{name}' is Python, which a pipeline file cannot load; pass --plugin {spec.unrun[name]}"
     file = spec.path.with_name(f"{name}.py") if spec.path is not None else Path()
     if os.path.isfile(file):  # a name may be too long for a file's
-        return (
-            f"node type '{name}' is Python beside the file and not loaded by itself; pass --plugin {shown_file(file)}"
-        )
+        text = f"node type '{name}' is Python beside the file and not loaded by itself"
+        return f"{text}; pass --plugin {shown_file(file)}"
     text = f"there is no node type '{shown(name)}'"
     near = nearest(name, catalog.names())
     if near is not None:
@@ -185,21 +184,14 @@ def stand_in(spec: PipelineSpec, node: NodeSpec) -> NodeType:
 
 
 def _outputs_used(spec: PipelineSpec, id: str) -> list[str]:
+    tables: list[tuple[str, Mapping[str, Value]]] = [("", spec.outputs)]
+    tables += [(node.scope, node.inputs) for node in spec.nodes.values()]
+    for scope, inner in spec.scopes.items():
+        tables += [(inner.parent, inner.links), (scope, inner.outputs)]
     found: dict[str, None] = {}
-    for scope, name, value in _links(spec):
+    for scope, name, value in [(scope, name, value) for scope, table in tables for name, value in table.items()]:
         for part in value.data if isinstance(value.data, list) else [value]:
             match = _LINK.match(part.data) if isinstance(part.data, str) else None
             if match is not None and f"{scope}{match[1]}" == id:
                 found[match[2] or name] = None
     return list(found)
-
-
-def _links(spec: PipelineSpec) -> Iterator[tuple[str, str, Value]]:
-    """Everything that may name a port: the scope that contains it, the port it is for, the value."""
-    tables: list[tuple[str, Mapping[str, Value]]] = [("", spec.outputs)]
-    tables += [(node.scope, node.inputs) for node in spec.nodes.values()]
-    for scope, inner in spec.scopes.items():
-        tables += [(inner.parent, inner.links), (scope, inner.outputs)]
-    for scope, table in tables:
-        for name, value in table.items():
-            yield scope, name, value

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from rendergraph.declare import InOut, Node, WrittenPort
 from rendergraph.errors import Problem
-from rendergraph.link.graph import Endpoint
+from rendergraph.link.graph import Endpoint, depth_first
 from rendergraph.link.nodes import Link, UnlinkedNode, line_of, missing_source
 
 
@@ -150,12 +150,5 @@ class Ancestors(dict[str, set[str]]):
         self._sources = sources(nodes)
 
     def __missing__(self, name: str) -> set[str]:
-        found: set[str] = set()
-        stack = [*self._sources[name]]
-        while stack:
-            node = stack.pop()
-            if node not in found:
-                found.add(node)
-                stack += self._sources[node]
-        self[name] = found
-        return found
+        self[name] = {*depth_first(self._sources, self._sources[name])}
+        return self[name]

@@ -48,7 +48,7 @@ def resolve(
     is_shipped = document.path is not None and shipped_pipelines().get(document.path.stem) == document.path
     home = Path() if is_shipped or document.path is None else document.path.parent  # folder of the resolved file
     roots = Roots.of_file(home / "x", files.asset_roots)
-    files.plugins.start(home, roots)
+    files.plugins.home, files.plugins.roots = home.resolve(), roots
     files.own(document, None if is_shipped else roots)
     tree = files.chain(document)
     overrides: dict[str, Value] = {}
@@ -220,9 +220,7 @@ def _with_scene(tree: Value, found: Path | None, document: Document) -> Value:
 
 
 def _with_plugins(tree: Value, files: Files) -> Value:
-    written = files.plugins.written
-    if not written:
+    if not (written := files.plugins.written):
         return tree
     named = tree.get("plugins") or next(iter(written.values()))
-    listed = [value.with_data(text) for text, value in written.items()]
-    return tree.updated({"plugins": named.with_data(list(listed))})
+    return tree.updated({"plugins": named.with_data([value.with_data(text) for text, value in written.items()])})

@@ -75,15 +75,10 @@ def _escaped(char: str) -> str:
 
 
 def _origin(value: Value) -> str:
-    name = _short(value.source)
+    path = value.source.path
+    is_shipped = path is not None and path.is_relative_to(folder("rendergraph.pipelines"))
+    name = path.stem if path is not None and is_shipped else str(value.source.origin)
     return f"{name}:{value.line}" if value.line else name
-
-
-def _short(source: Source) -> str:
-    shipped = folder("rendergraph.pipelines")
-    if source.path is not None and source.path.is_relative_to(shipped):
-        return source.path.stem
-    return str(source.origin)
 
 
 DEFAULT_SIZE = (1280, 720)
