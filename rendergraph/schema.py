@@ -68,14 +68,11 @@ def schema(catalog: Catalog, bases: Mapping[str, Mapping[str, str]] = {}, links:
         known = {id: {"$ref": f"#/definitions/inherited_{name}"} for id, name in nodes.items() if name in rules}
         for name in {*nodes.values()} & {*rules}:  # the type of the node unless the file changes it
             found["definitions"][f"inherited_{name}"] = {"if": {"not": {"required": ["type"]}}, "then": rules[name]}
-        condition = {"properties": {"extends": {"const": base}}, "required": ["extends"]}
-        then = {"properties": {"nodes": {"properties": known}}}
-        conditions.append({"if": condition, "then": then})
+        conditions.append({"if": _has("extends", base), "then": {"properties": {"nodes": {"properties": known}}}})
     if links:
         offered = {id: {"properties": {"inputs": {"properties": _offered(inputs)}}} for id, inputs in links.items()}
         conditions.append({"properties": {"nodes": {"properties": offered}}})
-    found["allOf"] = conditions
-    marked: Schema = as_markdown(found)
+    marked: Schema = as_markdown({**found, "allOf": conditions})
     return marked
 
 
@@ -107,51 +104,44 @@ def _node(types: Mapping[str, type[Node] | None], rules: Mapping[str, Schema]) -
     properties["type"]["anyOf"] = [*known, *elsewhere, {"type": "null"}]
     for part in ("inputs", "params"):  # the node's type defines them
         properties[part] = {"type": ["object", "null"], "description": properties[part]["description"]}
-    found["allOf"] = [
-        {"if": {"properties": {"type": {"const": name}}, "required": ["type"]}, "then": then}
-        for name, then in rules.items()
-    ]
-    return found
+    return {**found, "allOf": _by_type(rules)}
 
 
 def _whole_node(needed: Mapping[str, Schema]) -> Schema:
     """Require the inputs that each type needs, except for disabled nodes."""
-    rules = [
-        {"if": {"properties": {"type": {"const": name}}, "required": ["type"]}, "then": then}
-        for name, then in needed.items()
-        if then
-    ]
-    off = {"properties": {"enabled": {"const": False}}, "required": ["enabled"]}
-    return {"if": off, "else": {"allOf": rules}}
+    return {"if": _has("enabled", False), "else": {"allOf": _by_type(needed)}}
+
+
+def _by_type(rules: Mapping[str, Schema]) -> list[Schema]:
+    return [{"if": _has("type", name), "then": then} for name, then in rules.items() if then]
+
+
+def _has(key: str, value: Any) -> Schema:
+    return {"properties": {key: {"const": value}}, "required": [key]}
 
 
 def _needed(cls: type[Node]) -> Schema:
     """Require the inputs that a node needs; a group may stand for its members."""
-    inputs, groups = cls.inputs(), cls.groups()
     rules: list[Schema] = []
-    for name, port in inputs.items():
-        if not _is_required(port):
-            continue
-        ways = [name, *(group for group, members in groups.items() if name in members)]
+    for name in [name for name, port in cls.inputs().items() if _is_required(port)]:
+        ways = [name, *(group for group, members in cls.groups().items() if name in members)]
         rules += [{"required": ways} if len(ways) == 1 else {"anyOf": [{"required": [way]} for way in ways]}]
     return {"required": ["inputs"], "properties": {"inputs": {"allOf": rules}}} if rules else {}
 
 
 def _offered(inputs: Mapping[str, Sequence[str]]) -> Schema:
-    found: Schema = {}
-    for name, links in inputs.items():
-        offer = {"anyOf": [{"enum": [*links]}, {}]} if links else {}
-        found[name] = {**offer, "items": offer}
-    return found
+    offers: Schema = {name: {"anyOf": [{"enum": [*links]}, {}]} if links else {} for name, links in inputs.items()}
+    return {name: {**offer, "items": offer} for name, offer in offers.items()}
 
 
 def _about(cls: type[Node]) -> str:
     """Return the docs of a type and its outputs; lines of a paragraph are joined."""
     doc = re.sub(r"(?<!\n)\n(?![\n ])", " ", inspect.getdoc(cls) or "")
-    likes = {name: getattr(port, "like", None) for name, port in cls.outputs().items()}
-    words = {name: f"like `{like}`" if like else _port_type(cls.outputs()[name]) for name, like in likes.items()}
-    outputs = "\n".join(f"- `{name}`: {port.doc} ({words[name]})" for name, port in cls.outputs().items())
-    return f"{doc}\n\nOutputs:\n\n{outputs}"
+    outputs = ""
+    for name, port in cls.outputs().items():
+        like = getattr(port, "like", None)
+        outputs += f"\n- `{name}`: {port.doc} ({f'like `{like}`' if like else _port_type(port)})"
+    return f"{doc}\n\nOutputs:\n{outputs}"
 
 
 def _inputs(type_name: str, cls: type[Node]) -> Schema:
@@ -248,7 +238,6 @@ def outdated(pipeline: Path, roots: Roots, catalog: Catalog, plugins: Iterable[P
     changed = [f"'{name}' {'has changed' if name in then else 'is new'}" for name in now if now[name] != then.get(name)]
     if not changed:
         return None
-    rest = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
     words = [word for plugin in plugins for word in ("--plugin", str(plugin))]
     conditions = [entry["if"] for entry in written.get("allOf", ()) if "properties" in entry.get("if", {})]
     bases = {condition["properties"]["extends"]["const"] for condition in conditions}
@@ -258,16 +247,14 @@ def outdated(pipeline: Path, roots: Roots, catalog: Catalog, plugins: Iterable[P
     way_out = f"`{command}` writes it again"
     # Their plugins are not known here; shader files belong to the pipeline that names them.
     if gone := [f"'{name}'" for name in then if name not in now and "/" not in name]:
-        more = f" and {len(gone) - 3} more" if len(gone) > 3 else ""
-        way_out += f", with --plugin for {', '.join(gone[:3])}{more} too"
+        way_out += f", with --plugin for {_first(gone)} too"
     line = text.count("\n", 0, found.start()) + 1
-    return Problem(
-        "RG153",
-        f"the editor's schema '{shown(found[1])}' is out of date: {', '.join(changed[:3])}{rest}; {way_out}",
-        Place(shown_file(pipeline), line, 1),
-        text.splitlines()[line - 1],
-        "warning",
-    )
+    message = f"the editor's schema '{shown(found[1])}' is out of date: {_first(changed)}; {way_out}"
+    return Problem("RG153", message, Place(shown_file(pipeline), line, 1), text.splitlines()[line - 1], "warning")
+
+
+def _first(words: Sequence[str]) -> str:
+    return ", ".join(words[:3]) + (f" and {len(words) - 3} more" if len(words) > 3 else "")
 
 
 def _rules(found: Any) -> dict[str, Any]:

@@ -46,17 +46,12 @@ class CacheLimits(Struct, frozen=True):
         return self.mebibytes << 20
 
 
+_MEBIBYTES = "Textures and buffers of compiled pipelines, and copies of kept values."
 _CACHE = Table(
     "`cache`",
     (
         Key("programs", _SIZE, "Compiled programs.", default=CacheLimits().programs),
-        Key(
-            "mebibytes",
-            _SIZE,
-            "Textures and buffers of compiled pipelines, and copies of kept values.",
-            default=CacheLimits().mebibytes,
-            unit="MiB",
-        ),
+        Key("mebibytes", _SIZE, _MEBIBYTES, default=CacheLimits().mebibytes, unit="MiB"),
     ),
 )
 SETTINGS = Table(

@@ -128,45 +128,39 @@ def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True, heap
         views: let formats of one texel class share through texture views.
         heap: let textures of any description share blocks of memory, if that takes fewer bytes.
     """
-    descs = {id: resource.desc for id, resource in schedule.resources.items()}
-    classes = {id: storage_class(resource) for id, resource in schedule.resources.items()}
-    sizes = {id: desc.bytes for id, desc in descs.items()}
-    lifetimes = _lifetimes(schedule)
-    shareable = [
-        id for id in sorted(lifetimes, key=lambda id: (lifetimes[id].first, id)) if id not in schedule.whole_frame
-    ]
-    by_desc = _colour(shareable, lifetimes, descs, descs)
-    alike = len(set(classes.values())) == len(set(descs.values()))  # each class has one description
-    by_class = by_desc if alike else _colour(shareable, lifetimes, descs, classes)
+    sharing = _Sharing(schedule)
+    by_desc = sharing.colour(sharing.descs)
+    alike = len({*sharing.classes.values()}) == len({*sharing.descs.values()})  # each class has one description
+    by_class = by_desc if alike else sharing.colour(sharing.classes)
     better: list[tuple[Tier, Groups]] = []  # tiers above the requested one
     if not alias:
-        groups = [[id] for id in shareable]
+        groups = [[id] for id in sharing.ids]
         better = [("descriptor", by_desc), ("view", by_class)]
     elif views:
-        groups = _fewest_views(shareable, classes, by_desc, by_class)
+        groups = sharing.fewest_views(by_desc, by_class)
     else:
         groups = by_desc
         better = [("view", by_class)]
-    if len(shareable) <= MOST_PLACED:
-        blocks = _blocks(shareable, lifetimes, sizes, classes, by_desc)
+    if len(sharing.ids) <= MOST_PLACED:
+        blocks = sharing.blocks(by_desc)
         if not (alias and heap):
             better.append(("heap", blocks))
-        elif _bytes(blocks, sizes) < _bytes(groups, sizes):
+        elif sharing.bytes(blocks) < sharing.bytes(groups):
             groups = blocks
     # Without sharing, history takes two textures in any order.
     copies = schedule.history_copies if alias else dict.fromkeys(schedule.history_copies, 2)
-    physicals, placement = _physicals(schedule, groups, copies, sizes, classes)
+    physicals, placement = sharing.physicals(groups, copies)
     released: dict[int, list[str]] = defaultdict(list)
-    for id in shareable:
+    for id in sharing.ids:
         if id not in schedule.shown:
-            released[lifetimes[id].last].append(id)
+            released[sharing.lifetimes[id].last].append(id)
     return ResourcePlan(
         schedule=schedule,
-        lifetimes=lifetimes,
+        lifetimes=sharing.lifetimes,
         physicals=physicals,
         placement=placement,
         released={position: tuple(ids) for position, ids in sorted(released.items())},
-        memory=_memory(schedule, physicals, placement, better, sizes),
+        memory=_memory(sharing, physicals, placement, better),
         alias=alias,
         views=views,
         heap=heap,
@@ -189,116 +183,119 @@ def _lifetimes(schedule: Schedule) -> dict[str, Lifetime]:
     }
 
 
-Groups = list[list[str]]
+Groups: TypeAlias = list[list[str]]
 """The resources of each physical, in time order."""
 
 Kinds: TypeAlias = Mapping[str, object]
 """By id, a key that resources have in common if they can share."""
 
 
-def _colour(ids: Iterable[str], lifetimes: Mapping[str, Lifetime], descs: Kinds, kinds: Kinds) -> Groups:
-    """Colour the interval graph of each kind; prefer a free texture with the same description, then the oldest."""
-    groups: Groups = []
-    free: dict[object, list[int]] = defaultdict(list)  # by kind: indices into groups, lowest first
-    free_exact: dict[object, list[int]] = defaultdict(list)  # by description
-    taken: list[bool] = []
-    busy: list[tuple[int, int]] = []  # last position and group
-    for id in ids:
-        while busy and busy[0][0] < lifetimes[id].first:
-            _, group = heappop(busy)
-            taken[group] = False
-            owner = groups[group][-1]
-            heappush(free[kinds[owner]], group)
-            heappush(free_exact[descs[owner]], group)
-        found = _take(free_exact[descs[id]], taken, groups, descs, descs[id])
-        if found is None:
-            found = _take(free[kinds[id]], taken, groups, descs, None)
-        if found is None:
-            found = len(groups)
-            groups.append([])
-            taken.append(True)
-        taken[found] = True
-        groups[found].append(id)
-        heappush(busy, (lifetimes[id].last, found))
-    return groups
+class _Sharing:
+    """The resources of a schedule, and the ways to share memory among those that may.
 
+    Attributes:
+        ids: resources that may share, by their first positions.
+    """
 
-def _take(free: list[int], taken: Sequence[bool], groups: Groups, descs: Kinds, desc: object) -> int | None:
-    # Every free texture is queued by kind and by description; an entry is stale once the other queue gave it away.
-    while free:
-        group = heappop(free)
-        if not taken[group] and (desc is None or descs[groups[group][-1]] == desc):
-            return group
-    return None
+    def __init__(self, schedule: Schedule) -> None:
+        self.schedule = schedule
+        self.descs = {id: resource.desc for id, resource in schedule.resources.items()}
+        self.classes: Kinds = {id: storage_class(resource) for id, resource in schedule.resources.items()}
+        self.sizes = {id: desc.bytes for id, desc in self.descs.items()}
+        self.lifetimes = _lifetimes(schedule)
+        self.ids = sorted(self.lifetimes.keys() - schedule.whole_frame, key=self._position)
 
+    def _position(self, id: str) -> tuple[int, str]:
+        return self.lifetimes[id].first, id
 
-def _fewest_views(ids: Iterable[str], classes: Kinds, by_desc: Groups, by_class: Groups) -> Groups:
-    """Return the sharing by class if it saves bytes, else that by description, to avoid needless views."""
+    def _sorted(self, groups: Iterable[list[str]]) -> Groups:
+        return sorted(groups, key=lambda group: self._position(group[0]))
 
-    def kinds(groups: Groups) -> dict[object, Groups]:
-        table: dict[object, Groups] = defaultdict(list)
-        for group in groups:
-            table[classes[group[0]]].append(group)
-        return table
+    def bytes(self, groups: Groups) -> int:
+        return sum([max([self.sizes[id] for id in group]) for group in groups])
 
-    exact, loose = kinds(by_desc), kinds(by_class)
-    order = {id: place for place, id in enumerate(ids)}
-    chosen: Groups = []
-    for kind, groups in exact.items():
-        chosen += loose[kind] if len(loose[kind]) < len(groups) else groups
-    return sorted(chosen, key=lambda group: order[group[0]])
+    def colour(self, kinds: Kinds) -> Groups:
+        """Colour the interval graph of each kind; prefer a free texture with the same description, then the oldest."""
+        lifetimes, descs = self.lifetimes, self.descs
+        groups: Groups = []
+        free: dict[object, list[int]] = defaultdict(list)  # by kind: indices into groups, lowest first
+        free_exact: dict[object, list[int]] = defaultdict(list)  # by description
+        taken: list[bool] = []
+        busy: list[tuple[int, int]] = []  # last position and group
 
+        def take(queue: list[int], desc: object = None) -> int | None:
+            # Every free texture is queued by kind and by description; an entry is stale once the other queue gave it
+            # away.
+            while queue:
+                group = heappop(queue)
+                if not taken[group] and (desc is None or descs[groups[group][-1]] == desc):
+                    return group
+            return None
 
-def _blocks(
-    ids: Sequence[str], lifetimes: Mapping[str, Lifetime], sizes: Mapping[str, int], classes: Kinds, by_desc: Groups
-) -> Groups:
-    textures = [id for id in ids if not isinstance(classes[id], BufferDesc)]
-    items = tuple([HeapItem(sizes[id], lifetimes[id].first, lifetimes[id].last, classes[id]) for id in textures])
-    buffers = [group for group in by_desc if isinstance(classes[group[0]], BufferDesc)]
-    blocks = [[textures[number] for number in block] for block in share_blocks(items)]
-    order = {id: place for place, id in enumerate(ids)}
-    return sorted([*buffers, *blocks], key=lambda group: order[group[0]])
+        for id in self.ids:
+            while busy and busy[0][0] < lifetimes[id].first:
+                _, group = heappop(busy)
+                taken[group] = False
+                owner = groups[group][-1]
+                heappush(free[kinds[owner]], group)
+                heappush(free_exact[descs[owner]], group)
+            found = take(free_exact[descs[id]], descs[id])
+            if found is None:
+                found = take(free[kinds[id]])
+            if found is None:
+                found = len(groups)
+                groups.append([])
+                taken.append(True)
+            taken[found] = True
+            groups[found].append(id)
+            heappush(busy, (lifetimes[id].last, found))
+        return groups
 
+    def fewest_views(self, by_desc: Groups, by_class: Groups) -> Groups:
+        """Return the sharing by class if it saves bytes, else that by description, to avoid needless views."""
+        tables: list[dict[object, Groups]] = []
+        for groups in (by_desc, by_class):
+            tables.append(defaultdict(list))
+            for group in groups:
+                tables[-1][self.classes[group[0]]].append(group)
+        exact, loose = tables
+        return self._sorted(group for kind in exact for group in min(exact[kind], loose[kind], key=len))
 
-def _bytes(groups: Groups, sizes: Mapping[str, int]) -> int:
-    return sum([max([sizes[id] for id in group]) for group in groups])
+    def blocks(self, by_desc: Groups) -> Groups:
+        spans = [(id, self.lifetimes[id]) for id in self.ids if not isinstance(self.descs[id], BufferDesc)]
+        items = tuple([HeapItem(self.sizes[id], span.first, span.last, self.classes[id]) for id, span in spans])
+        buffers = [group for group in by_desc if isinstance(self.descs[group[0]], BufferDesc)]
+        return self._sorted([*buffers, *[[spans[number][0] for number in block] for block in share_blocks(items)]])
 
-
-def _physicals(
-    schedule: Schedule, groups: Groups, copies: Mapping[str, int], sizes: Mapping[str, int], classes: Kinds
-) -> tuple[tuple[Physical, ...], dict[str, tuple[int, ...]]]:
-    physicals: list[Physical] = []
-    placement: dict[str, tuple[int, ...]] = {}
-    whole = [id for id in schedule.resources if id in schedule.whole_frame]
-    for members in (*groups, *([id] for id in whole)):
-        resource = schedule.resources[max(members, key=sizes.__getitem__)]
-        first = len(physicals)
-        taken = 0 if resource.role == "scene" else sizes[resource.id]
-        block = len({classes[id] for id in members}) > 1
-        for _ in range(copies.get(resource.id, 1)):
-            physicals.append(Physical(len(physicals), resource.desc, tuple(members), taken, block))
-        for id in members:
-            placement[id] = tuple(range(first, len(physicals)))
-    return tuple(physicals), placement
+    def physicals(
+        self, groups: Groups, copies: Mapping[str, int]
+    ) -> tuple[tuple[Physical, ...], dict[str, tuple[int, ...]]]:
+        resources, whole_frame = self.schedule.resources, self.schedule.whole_frame
+        physicals: list[Physical] = []
+        placement: dict[str, tuple[int, ...]] = {}
+        for members in (*groups, *([id] for id in resources if id in whole_frame)):
+            resource = resources[max(members, key=self.sizes.__getitem__)]
+            first = len(physicals)
+            taken = 0 if resource.role == "scene" else self.sizes[resource.id]
+            block = len({self.classes[id] for id in members}) > 1
+            for _ in range(copies.get(resource.id, 1)):
+                physicals.append(Physical(len(physicals), resource.desc, tuple(members), taken, block))
+            placement |= dict.fromkeys(members, tuple(range(first, len(physicals))))
+        return tuple(physicals), placement
 
 
 def _memory(
-    schedule: Schedule,
+    sharing: _Sharing,
     physicals: Sequence[Physical],
     placement: Mapping[str, tuple[int, ...]],
     better: Iterable[tuple[Tier, Groups]],
-    sizes: Mapping[str, int],
 ) -> MemoryFigures:
-    resources = schedule.resources
+    schedule, resources = sharing.schedule, sharing.schedule.resources
     constant = sum(physicals[place].bytes for id in schedule.whole_frame for place in placement[id])
     allocated = sum(physical.bytes for physical in physicals)
     viewed = any(resources[id].desc != physical.desc for physical in physicals for id in physical.members)
-    next_tier: Tier | None = None
-    next_bytes: int | None = None
-    for name, groups in better:
-        total = constant + _bytes(groups, sizes)
-        if next_bytes is None and total < allocated:
-            next_tier, next_bytes = name, total
+    totals = [(name, constant + sharing.bytes(groups)) for name, groups in better]
+    next_tier, next_bytes = next((tier for tier in totals if tier[1] < allocated), (None, None))
     return MemoryFigures(
         no_reuse_bytes=sum(resource.bytes for resource in resources.values()),
         allocated_bytes=allocated,

@@ -177,11 +177,8 @@ def from_plain(data: Any, source: Source) -> Value:
         data = fspath(data)
     if data is None or isinstance(data, str | float) or (isinstance(data, int) and abs(data) < 2**63):
         return Value(data, source)
-    raise InputError(
-        source.problem(
-            "RG106", f"{shown(repr(data))} cannot be written to a file; use text, numbers, lists and mappings"
-        )
-    )
+    text = f"{shown(repr(data))} cannot be written to a file; use text, numbers, lists and mappings"
+    raise InputError(source.problem("RG106", text))
 
 
 def merge_patch(target: Value | None, patch: Value, *, keep_nulls: bool = False) -> Value:

@@ -200,15 +200,14 @@ def _table(table: Table) -> Schema:
     rules = []
     for name, allowed in table.alternatives.items():
         for word, keys in [(None, allowed)] if isinstance(allowed, tuple) else allowed.items():
-            condition = _GIVEN if word is None else {"const": word}
-            rules.append(
-                {
-                    "if": {"properties": {name: condition}, "required": [name]},
-                    "then": {"properties": common | _properties(keys), "additionalProperties": False},
-                }
-            )
-    one = [{"properties": {name: _GIVEN}, "required": [name]} for name in table.alternatives]
-    return {**found, "oneOf": one, "allOf": rules}
+            condition = _has(name, _GIVEN if word is None else {"const": word})
+            then = {"properties": common | _properties(keys), "additionalProperties": False}
+            rules.append({"if": condition, "then": then})
+    return {**found, "oneOf": [_has(name, _GIVEN) for name in table.alternatives], "allOf": rules}
+
+
+def _has(name: str, values: Schema) -> Schema:
+    return {"properties": {name: values}, "required": [name]}
 
 
 def _properties(keys: tuple[Key, ...]) -> Schema:

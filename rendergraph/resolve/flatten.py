@@ -49,7 +49,7 @@ class Flattener(Struct, eq=False):
         for name, lost in inner.items():
             for setting in lost:
                 text = f"there is no sub-pipeline '{scope}{name}'{suggestion(name, nodes)}"
-                self.files.report(setting.problem("RG109", text))
+                self.files.report(setting.value.problem("RG109", text))
         for name, value in declared.items():
             if name not in used:
                 problem = value.problem("RG151", f"the parameter '{name}' is used nowhere", key=True)
@@ -83,7 +83,7 @@ class Flattener(Struct, eq=False):
             return self._composite(spec, node_type, sub, sets)
         for setting in sets:
             text = f"node '{spec.id}' is not a sub-pipeline, so it has no inner nodes to set"
-            self.files.report(setting.problem("RG109", text))
+            self.files.report(setting.value.problem("RG109", text))
         if len(self.nodes) >= MOST_NODES:
             text = f"the pipeline has more than {MOST_NODES:,} nodes, sub-pipelines unfolded"
             raise InputError([*self.files.problems, node.problem("RG018", text, key=True)])

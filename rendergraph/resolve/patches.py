@@ -59,15 +59,13 @@ def merge_pipeline(target: Value, patch: Value, names_of: NamesOf) -> tuple[Valu
     disconnected: dict[str, dict[str, Value]] = {}
     fed: list[tuple[str, Value, Value, frozenset[str]]] = []
     for name, change in new_nodes.items():
-        node = old_nodes.get(name)
-        if node is None:
+        if (node := old_nodes.get(name)) is None:
             continue
-        new_type = change.get("type")
-        retyped = new_type is not None and new_type.data is not None and _differ(node.get("type"), new_type)
-        if retyped and new_type is not None and (names := names_of(new_type)):
+        new_type = _new_type(node, change)
+        if new_type is not None and (names := names_of(new_type)):
             kept[name] = _drop(name, node, change, new_type, names, notes)
             fed.append((name, node, new_type, names.outputs))
-        elif not retyped and (names := names_of(node.get("type") or node)) and names.groups:
+        elif new_type is None and (names := names_of(node.get("type") or node)) and names.groups:
             inputs = change.get("inputs")
             members = {member for group in names.groups.values() for member in group}
             inherited = inputs.mapping if inputs is not None else {}
@@ -92,12 +90,12 @@ def merge_pipeline(target: Value, patch: Value, names_of: NamesOf) -> tuple[Valu
     return merged, notes
 
 
-def _differ(old: Value | None, new: Value) -> bool:
-    if old is None:
-        return False
-    if isinstance(old.data, str) and isinstance(new.data, str):
-        return old.data != new.data
-    return True
+def _new_type(node: Value, change: Value) -> Value | None:
+    """Return the type that a change gives a node, if it is another than before."""
+    old, new = node.get("type"), change.get("type")
+    if old is None or new is None or new.data is None:
+        return None
+    return None if isinstance(new.data, str) and new.data == old.data else new
 
 
 def _drop(name: str, node: Value, change: Value, new_type: Value, names: TypeNames, notes: list[Problem]) -> Value:
@@ -170,9 +168,6 @@ class Setting(Struct, frozen=True):
     value: Value
     text: str
 
-    def problem(self, code: str, text: str) -> Problem:
-        return self.value.problem(code, text)
-
 
 def settings(sets: Sequence[str] | Mapping[str, object]) -> list[Setting]:
     """Parse assignments: `PATH=VALUE` texts, or a mapping of paths to values."""
@@ -227,48 +222,50 @@ def patch_of(tree: Value, wanted: Sequence[Setting], names_of: NamesOf) -> tuple
         return None, []
     problems: list[Problem] = []
     root = Value({}, wanted[0].value.source)
-    nodes = entries(tree, "nodes")
-    parameters = entries(tree, "parameters")
-    known = []
+    nodes, parameters = entries(tree, "nodes"), entries(tree, "parameters")
+
+    def put(setting: Setting, *path: str) -> None:
+        found = root
+        for step in path[:-1]:
+            found = found.mapping.setdefault(step, Value({}, setting.value.source))
+        found.mapping[path[-1]] = setting.value
+
+    def refuse(setting: Setting, code: str, text: str) -> None:
+        problems.append(setting.value.problem(code, text))
+
+    known: list[tuple[Setting, str]] = []
     for setting in wanted:
-        if setting.node == "scene" and "scene" not in nodes:
-            _put(root, setting.value, "scene", *setting.name.split("."))
-        elif setting.node is None:
-            if setting.name in parameters:
-                _put(root, setting.value, "parameters", setting.name, "default")
-            else:
-                problems.append(_no_parameter(setting, parameters, nodes, names_of))
-        elif setting.node not in nodes:
-            text = f"there is no node '{setting.node}'{suggestion(setting.node, nodes)}"
-            problems.append(setting.problem("RG109", text))
-        elif setting.name in _NODE_KEYS:
-            expected, words = _NODE_KEYS[setting.name]
-            if isinstance(setting.value.data, expected):
-                _put(root, setting.value, "nodes", setting.node, setting.name)
-            else:
-                text = f"'{setting.text}': expected {words}, got {setting.value.kind}"
-                problems.append(setting.problem("RG106", text))
+        node, name = setting.node, setting.name
+        if node == "scene" and "scene" not in nodes:
+            put(setting, "scene", *name.split("."))
+        elif node is None and name in parameters:
+            put(setting, "parameters", name, "default")
+        elif node is None:
+            refuse(setting, "RG119", _no_parameter(setting, parameters, nodes, names_of))
+        elif node not in nodes:
+            refuse(setting, "RG109", f"there is no node '{node}'{suggestion(node, nodes)}")
+        elif name not in _NODE_KEYS:
+            known.append((setting, node))
+        elif isinstance(setting.value.data, _NODE_KEYS[name][0]):
+            put(setting, "nodes", node, name)
         else:
-            known.append(setting)
-    for setting in known:
-        assert setting.node is not None
-        node = nodes[setting.node]
-        new_type = root.get("nodes", setting.node, "type") or node.get("type")
+            text = f"'{setting.text}': expected {_NODE_KEYS[name][1]}, got {setting.value.kind}"
+            refuse(setting, "RG106", text)
+    for setting, node in known:
+        name, new_type = setting.name, root.get("nodes", node, "type") or nodes[node].get("type")
         names = names_of(new_type) if new_type is not None else None
         if names is None:
             continue  # an unknown type is reported only once, at the type
-        if setting.name not in names.params | names.inputs:
-            choices = sorted(names.params | names.inputs)
-            word = new_type.data if new_type is not None and isinstance(new_type.data, str) else "sub-pipeline"
-            text = f"node '{setting.node}' ({word}) has no param or input '{setting.name}'"
-            problems.append(setting.problem("RG103", text + suggestion(setting.name, choices)))
-        elif setting.name in names.params:
-            _put(root, setting.value, "nodes", setting.node, "params", setting.name)
-        elif not _is_link(setting.value):
-            text = f"'{setting.text}': expected a link as in 'node.port', a list of links, or null"
-            problems.append(setting.problem("RG106", text))
+        if name in names.params:
+            put(setting, "nodes", node, "params", name)
+        elif name not in names.inputs:
+            hint = suggestion(name, sorted(names.params | names.inputs))
+            text = f"node '{node}' ({word(new_type) or 'sub-pipeline'}) has no param or input '{name}'"
+            refuse(setting, "RG103", text + hint)
+        elif _is_link(setting.value):
+            put(setting, "nodes", node, "inputs", name)
         else:
-            _put(root, setting.value, "nodes", setting.node, "inputs", setting.name)
+            refuse(setting, "RG106", f"'{setting.text}': expected a link as in 'node.port', a list of links, or null")
     return root, problems
 
 
@@ -279,19 +276,17 @@ def _is_link(value: Value) -> bool:
 
 def _no_parameter(
     setting: Setting, parameters: Mapping[str, Value], nodes: Mapping[str, Value], names_of: NamesOf
-) -> Problem:
+) -> str:
     text = f"the pipeline has no parameter '{setting.name}'"
     if setting.name in ("size", "scene"):
-        text += f"; --{setting.name} sets the {setting.name}"
-    elif setting.name in nodes and setting.value.data in (None, False, "off", "none"):
-        text += f"; to leave out node '{setting.name}', write {setting.name}.enabled=false"
-    elif setting.name in nodes:
-        text += f"; to set one of node '{setting.name}', write {setting.name}.PARAM=VALUE"
-    elif nearest(setting.name, parameters) is None and (meant := _of_nodes(setting.name, nodes, names_of)):
-        text += f"; did you mean {' or '.join(meant)}?"
-    else:
-        text += suggestion(setting.name, parameters)
-    return setting.problem("RG119", text)
+        return f"{text}; --{setting.name} sets the {setting.name}"
+    if setting.name in nodes and setting.value.data in (None, False, "off", "none"):
+        return f"{text}; to leave out node '{setting.name}', write {setting.name}.enabled=false"
+    if setting.name in nodes:
+        return f"{text}; to set one of node '{setting.name}', write {setting.name}.PARAM=VALUE"
+    if nearest(setting.name, parameters) is None and (meant := _of_nodes(setting.name, nodes, names_of)):
+        return f"{text}; did you mean {' or '.join(meant)}?"
+    return text + suggestion(setting.name, parameters)
 
 
 def _of_nodes(name: str, nodes: Mapping[str, Value], names_of: NamesOf) -> list[str]:
@@ -303,10 +298,3 @@ def _of_nodes(name: str, nodes: Mapping[str, Value], names_of: NamesOf) -> list[
             known.setdefault(parameter, []).append(f"'{node}.{parameter}'")
     near = nearest(name, known)
     return known[near] if near else []
-
-
-def _put(root: Value, value: Value, *path: str) -> None:
-    found = root
-    for step in path[:-1]:
-        found = found.mapping.setdefault(step, Value({}, value.source))
-    found.mapping[path[-1]] = value
