@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -90,8 +89,11 @@ class VersionAssignment:
         if self.graph.cyclic:
             self._by_step()
         else:
-            for recording in self.recordings.values():
-                self._node(recording)
+            self._by_node()
+        for recording in self.recordings.values():
+            outputs = [port for port in recording.node.node.outputs().values() if port.name in recording.used_ports]
+            if not recording.requests and not any(isinstance(port, Function | Views) for port in outputs):
+                self.idle[recording.node.id] = "it recorded no step"
         self._check_buffers()
 
     def _check_buffers(self) -> None:
@@ -107,22 +109,15 @@ class VersionAssignment:
         node = self.graph[id.rpartition(".")[0]].node
         return isinstance(self.resources[id].desc, BufferDesc) and type(node).update is Node.update
 
-    def _node(self, recording: Recording) -> None:
-        self._declare(recording)
-        for number, request in enumerate(recording.requests):
-            self.steps.append(self._step(recording, request, number))
-        self._note_idle(recording)
-        for end in recording.own.values():
-            if end in self.final:
-                resource, _ = self.final[end]
-                self.final[end] = resource, self.version[resource]
-
-    def _note_idle(self, recording: Recording) -> None:
-        if not recording.requests and not any(
-            isinstance(port, Function | Views) and port.name in recording.used_ports
-            for port in recording.node.node.outputs().values()
-        ):
-            self.idle[recording.node.id] = "it recorded no step"
+    def _by_node(self) -> None:
+        for recording in self.recordings.values():
+            self._declare(recording)
+            for number in range(len(recording.requests)):
+                self.steps.append(self._step(recording, number))
+            for end in recording.own.values():
+                if end in self.final:
+                    resource, _ = self.final[end]
+                    self.final[end] = resource, self.version[resource]
 
     def _by_step(self) -> None:
         """Assign versions if nodes form a cycle: steps of one node run before and after those of others."""
@@ -131,10 +126,8 @@ class VersionAssignment:
         for recording in self.recordings.values():
             self._declare(recording)
         for name, number in step_order(self):
-            recording = self.recordings[name]
-            self.steps.append(self._step(recording, recording.requests[number], number))
+            self.steps.append(self._step(self.recordings[name], number))
         for recording in self.recordings.values():
-            self._note_idle(recording)
             for end in recording.own.values():
                 self._final(end)
 
@@ -160,7 +153,7 @@ class VersionAssignment:
             end = recording.own[name]
             if end in self.graph.empty:
                 continue
-            if isinstance(made, InOut) and recording.links.get(name):
+            if recording.continues(made):
                 before = self.follow(recording.links[name][0])
                 if self.graph.cyclic:
                     continue  # deferred until a step needs it: its source is not written yet
@@ -176,16 +169,13 @@ class VersionAssignment:
 
     def _maker(self, end: Endpoint) -> Endpoint:
         """Return the port that first created a texture, however many nodes continue it."""
-        end = end.now
-        while True:
-            node = self.graph[end.node]
-            continued = isinstance(node.node.ports()[end.port], InOut) and node.inputs.get(end.port)
-            if not continued:
-                return end
-            end = continued[0].now
+        node = self.graph[end.node]
+        while isinstance(node.node.ports()[end.port], InOut) and (links := node.inputs.get(end.port)):
+            end, node = links[0], self.graph[links[0].node]
+        return end.now
 
-    def _step(self, recording: Recording, request: StepRequest, index: int) -> Step:
-        node = recording.node
+    def _step(self, recording: Recording, index: int) -> Step:
+        node, request = recording.node, recording.requests[index]
         options = request.options
         reads: list[Read] = []
         functions: list[FunctionBinding] = []
@@ -204,7 +194,7 @@ class VersionAssignment:
                 called |= {name} if ends else set()
         writes: list[Write] = []
         for name, part in request.out:
-            read, write = self._write(recording, request, name, part, options.get("value"))
+            read, write = self._write(recording, request, name, part)
             reads += read
             writes.append(write)
         all_reads = [*reads, *[read for f in functions for read in f.reads]]
@@ -280,9 +270,7 @@ class VersionAssignment:
         kind = desc.kind if isinstance(desc, TextureDesc) and part.layer is None else "texture2d"
         return Read(name, resource, version, use, sampler, part.mip, part.layer, end.previous, kind)
 
-    def _write(
-        self, recording: Recording, request: StepRequest, name: str, part: Part, value: Any
-    ) -> tuple[list[Read], Write]:
+    def _write(self, recording: Recording, request: StepRequest, name: str, part: Part) -> tuple[list[Read], Write]:
         port = part.port
         assert isinstance(port, WrittenPort)  # checked by `steps`
         end = recording.own[port.name]
@@ -294,13 +282,13 @@ class VersionAssignment:
         old = self.version[resource]
         self.version[resource] = old + 1
         self.final[end] = resource, old + 1
-        continued = isinstance(port, InOut) and bool(recording.links.get(port.name))
+        continued = recording.continues(port)
         parts, touched = self.written[resource], parts_written(request, part, desc)
         fresh = not continued and not any(overlap(one, other) for one in parts for other in touched)
         parts |= touched
         clear = recording.node.clears[port.name]
         if request.kind == "clear":
-            load, clear = "clear", value
+            load, clear = "clear", request.options.get("value")
         elif request.kind == "mipmaps" or not fresh:
             load = "load"
         else:
@@ -365,15 +353,9 @@ class VersionAssignment:
             if isinstance(source, Internal) and not filled and not self.written[self.final[recording.own[name]][0]]:
                 continue
             reads += self._reads(recording, name, read if isinstance(read, Part) else source.whole)
-        present = tuple((f"HAS_{read.name.upper()}", "1") for read in reads)
+        defines = (*[(f"HAS_{read.name.upper()}", "1") for read in reads], *recording.defines)
         return FunctionBinding(
-            port.signature.name,
-            node.id,
-            port.shader,
-            tuple(reads),
-            (*present, *recording.defines),
-            recording.uniforms,
-            recording.includes,
+            port.signature.name, node.id, port.shader, tuple(reads), defines, recording.uniforms, recording.includes
         )
 
 

@@ -30,7 +30,7 @@ from rendergraph.schedule.dependencies import (
     read_first_choices,
 )
 from rendergraph.schedule.model import Cost, Frame, Model, alive_all_frame
-from rendergraph.schedule.seeds import program_order, random_order, seeds
+from rendergraph.schedule.search import improve, program_order, random_order, search, seeds
 from rendergraph.steps import MOST_STEPS, Resource, Step
 
 # Resources visited per second of budget: a count, so that slow and fast machines find the same schedule.
@@ -224,8 +224,6 @@ def _ordered(model: Model, budget: int) -> tuple[Sequence[int], Cost, int, int]:
             break
     least = min(cost.peak for cost, _ in orders)
     if least > bound and len(model) <= MOST_SEARCHED:
-        from rendergraph.schedule.search import search  # most pipelines do not need a search
-
         better, bound = search(model, below=least, bound=bound, budget=budget)
         if better is not None:
             orders.append((model.cost(better), better))
@@ -233,8 +231,6 @@ def _ordered(model: Model, budget: int) -> tuple[Sequence[int], Cost, int, int]:
     # For equal costs the order found first wins, which is the reading order.
     cost, best = min(orders, key=lambda pair: pair[0][:2])
     if cost.pool > pool_bound and len(model) <= MOST_SEARCHED:
-        from rendergraph.schedule.search import improve  # as above
-
         better, improved = improve(model, best, pool_bound=pool_bound, budget=budget // 5)
         least = min(least, improved.peak)
         if improved[:2] < cost[:2]:
