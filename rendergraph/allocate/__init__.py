@@ -169,16 +169,14 @@ def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True, heap
 
 def _lifetimes(schedule: Schedule) -> dict[str, Lifetime]:
     last = max(0, len(schedule.steps) - 1)
-    first_touch: dict[str, int] = {}
-    last_touch: dict[str, int] = {}
+    touches: dict[str, list[int]] = defaultdict(list)
     for position, step in enumerate(schedule.steps):
         for id in touched_ids(step):
-            first_touch.setdefault(id, position)
-            last_touch[id] = position
+            touches[id].append(position)
     return {
         id: Lifetime(0, last)
         if id in schedule.whole_frame
-        else Lifetime(first_touch[id], last if id in schedule.shown else last_touch[id])
+        else Lifetime(touches[id][0], last if id in schedule.shown else touches[id][-1])
         for id in schedule.resources
     }
 

@@ -97,13 +97,10 @@ def _check_kept(steps: Sequence[Step], resources: Mapping[str, Resource]) -> Non
 
     Other values that their shaders read are checked when the program text is assembled.
     """
-    problems = [
-        step.problem("RG439", text)
-        for step in steps
-        for made in [[write.resource for write in step.writes if resources[write.resource].role == "kept"]]
-        if made
-        for text in _dependencies(step, made, resources)
-    ]
+    problems: list[Problem] = []
+    for step in steps:
+        made = [write.resource for write in step.writes if resources[write.resource].role == "kept"]
+        problems += [step.problem("RG439", text) for text in (_dependencies(step, made, resources) if made else ())]
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
 

@@ -12,7 +12,7 @@ from rendergraph.document import Value
 from rendergraph.errors import InputError, Option, Problem, suggestion
 from rendergraph.facts import ObjectFacts, SceneDataFacts
 from rendergraph.keys import MOST_PROBLEMS
-from rendergraph.link.check import Checker, port_kind
+from rendergraph.link.check import Ancestors, Checker, cycles, needs, port_kind, sources, versions
 from rendergraph.link.graph import Endpoint, Graph, GraphNode, upstream_first
 from rendergraph.link.infer import TextureInference
 from rendergraph.link.instances import choice_files, instance, stand_in, unknown_type
@@ -27,7 +27,6 @@ from rendergraph.link.nodes import (
     missing_source,
     remove_disabled,
 )
-from rendergraph.link.order import Ancestors, cycles, needs, sources, versions
 from rendergraph.resolve import NodeSpec, PipelineSpec
 from rendergraph.textures import SEMANTICS, TEXTURE_KINDS, Radiance, TextureDesc
 

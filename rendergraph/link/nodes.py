@@ -301,12 +301,9 @@ def line_of(place: Place, other: Place) -> str:
 
 def mark_without_environment(nodes: Mapping[str, UnlinkedNode]) -> None:
     """Mark nodes that need an environment which neither another node nor the scene provides."""
-    waiting = list(nodes.values())
-    while waiting:
-        without = [draft for draft in waiting if not draft.is_removed and _lacks_environment(draft, nodes)]
+    while without := [one for one in nodes.values() if not one.is_removed and _lacks_environment(one, nodes)]:
         for draft in without:
             draft.unlit = True
-        waiting = waiting if without else []
 
 
 def _lacks_environment(draft: UnlinkedNode, nodes: Mapping[str, UnlinkedNode]) -> bool:

@@ -138,7 +138,9 @@ class Files:
     def sub_pipeline(self, value: Value) -> Value | None:
         """Return the merged file that a `type` names; None for node types and missing files."""
         if isinstance(value.data, dict):
-            return self._inline(value)
+            self.bring(value)
+            inline = Document(value, value.source)
+            return value if word(value, "extends") is None else self.chain(checked(inline, keep_going=True))
         text = str(value.data)
         if text.endswith(SHADERS) or (is_name(text) and (text in self.catalog or text not in shipped_pipelines())):
             return None
@@ -155,12 +157,6 @@ class Files:
             except InputError as error:
                 self.problems = list(error.problems)
         return self._trees[key]
-
-    def _inline(self, value: Value) -> Value:
-        self.bring(value)
-        if word(value, "extends") is None:
-            return value
-        return self.chain(checked(Document(value, value.source), keep_going=True))
 
     def path_of(self, value: Value) -> Path | None:
         if not isinstance(value.data, str):
@@ -293,7 +289,3 @@ class Plugins:
             self.unrun |= dict.fromkeys((file.stem for file in strange), named)
             problem = value.problem("RG152", words + f"if you trust it, pass --plugin {named}")
             self.notes.append(problem.as_warning())
-
-
-def display(text: object) -> str:
-    return shown(text) if isinstance(text, str) else "sub-pipeline"

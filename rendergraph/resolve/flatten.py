@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from rendergraph.document import Value, shown
 from rendergraph.errors import InputError, suggestion
 from rendergraph.read import NAME, entries, flag, word
-from rendergraph.resolve.files import Files, display
+from rendergraph.resolve.files import Files
 from rendergraph.resolve.patches import Setting, patch_of
 from rendergraph.resolve.spec import NodeSpec, PipelineParameter, Scope
 from rendergraph.typecheck import Range, fits, words_for
@@ -104,7 +104,7 @@ class Flattener(Struct, eq=False):
         return node.updated({"type": node_type.with_data(type_name)}) if written else node
 
     def _composite(self, spec: NodeSpec, node_type: Value, sub: Value, sets: Sequence[Setting]) -> Value:
-        node, shown_type = spec.value, display(node_type.data)
+        node, shown_type = spec.value, shown(word(node_type) or "sub-pipeline")
         path = self.files.path_of(node_type)
         if path in self._open or len(self._open) >= MOST_NESTED:
             self.files.report(node_type.problem("RG123", f"the sub-pipeline '{shown_type}' contains itself"))
