@@ -99,11 +99,8 @@ class ResourcePlan(Struct, frozen=True, dict=True):
     heap: bool
 
     def __repr__(self) -> str:
-        memory = self.memory
-        return (
-            f"<ResourcePlan: {len(self.schedule.steps)} steps, {memory.allocated_bytes} bytes, "
-            f"{memory.no_reuse_bytes} without reuse>"
-        )
+        count, memory = len(self.schedule.steps), self.memory
+        return f"<ResourcePlan: {count} steps, {memory.allocated_bytes} bytes, {memory.no_reuse_bytes} without reuse>"
 
     @property
     def resources(self) -> Mapping[str, Resource]:
@@ -333,11 +330,9 @@ def _reasons(plan: ResourcePlan) -> dict[str, str]:
         elif not plan.alias:
             reasons[id] = "aliasing is off"
         elif len(physical.members) == 1:
-            reasons[id] = (
-                f"no other {word} {what if word == 'texture' else 'is of its size'}"
-                if count[kinds[id]] == 1
-                else f"whenever it is alive, all {word}s it could share are in use"
-            )
+            reasons[id] = f"whenever it is alive, all {word}s it could share are in use"
+            if count[kinds[id]] == 1:
+                reasons[id] = f"no other {word} {what if word == 'texture' else 'is of its size'}"
         else:
             word = "block" if physical.block else word
             place = physical.members.index(id)

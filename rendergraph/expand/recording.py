@@ -43,11 +43,7 @@ class Recording:
         self.used_ports = used
         self.requests: list[StepRequest] = []
         self.unfilled: list[str] = []
-        self.links: dict[str, tuple[Endpoint, ...]] = dict(node.inputs)
-        if graph.empty:
-            self.links = {
-                name: tuple([e for e in ends if e.now not in graph.empty]) for name, ends in node.inputs.items()
-            }
+        self.links = {name: tuple([e for e in ends if e.now not in graph.empty]) for name, ends in node.inputs.items()}
         for name, port in node.type.read.items():
             if port.takes_scene and not self.links.get(name) and graph.facts.of_scene(port.semantic):
                 self.links[name] = (OF_SCENE[port.semantic],)

@@ -306,10 +306,8 @@ class _Linker:
                     text = f"output '{name}' shows a texture, but '{found.source}' is a {kind}"
                     self._report(found.value.problem("RG129", text))
                 elif name == "image" and info.semantic.name == Radiance.name:
-                    text = (
-                        "output 'image' is scene-linear light without an output transform; add one "
-                        "('rendergraph nodes display' lists them), or call the output 'radiance'"
-                    )
+                    text = "output 'image' is scene-linear light without an output transform; add one "
+                    text += "('rendergraph nodes display' lists them), or call the output 'radiance'"
                     self.warnings.append(found.value.problem("RG154", text).as_warning())
 
     def _warn_of_unused_settings(self) -> None:

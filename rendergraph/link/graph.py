@@ -95,9 +95,8 @@ class Graph(Struct, frozen=True, dict=True):
         """The line that `check` prints about it."""
         links = sum(len(ends) for node in self.nodes for ends in node.inputs.values())
         width, height = self.size
-        return (
-            f"{self.name}: {len(self.nodes)} nodes, {links} links, {width}×{height}, outputs {', '.join(self.outputs)}"
-        )
+        counts = f"{len(self.nodes)} nodes, {links} links"
+        return f"{self.name}: {counts}, {width}×{height}, outputs {', '.join(self.outputs)}"
 
     def __getitem__(self, node: str) -> GraphNode:
         return self.members[node]

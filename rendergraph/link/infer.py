@@ -230,8 +230,8 @@ class TextureInference:
         desc = self._desc(end, port, like.desc if like is not None else None, layers)
         if like is not None:
             view, lights = view or like.view, lights or like.lights
-        if drawing_view is not None and desc.size == self._view_size(drawing_view):
-            view = str(drawing_view)  # its texels correspond to those drawn with this view
+        if drawing_view is not None and desc.size == self._size(*drawing_view, None):
+            view = str(drawing_view[0])  # its texels correspond to those drawn with this view
         return TextureInfo(desc, semantic, view, lights)
 
     def _linked(self, draft: UnlinkedNode, name: str | None) -> TextureInfo | None:
@@ -288,13 +288,13 @@ class TextureInference:
             if like is not None and port.size is None:
                 base = like.size
             elif isinstance(port, WrittenPort) and (drawing_view := self._drawing_view(draft)) is not None:
-                base = self._view_size(drawing_view)
+                base = self._size(*drawing_view, None)
         width, height = base if factor == 1.0 else [max(1, math.ceil(side * factor - 1e-9)) for side in base]
         if not (1 <= width <= MOST_SIDE and 1 <= height <= MOST_SIDE):
             self._stop(end, "RG207", f"its size is {width}×{height}; width and height must be from 1 to {MOST_SIDE}")
         return width, height
 
-    def _drawing_view(self, draft: UnlinkedNode) -> Endpoint | None:
+    def _drawing_view(self, draft: UnlinkedNode) -> tuple[Endpoint, Views] | None:
         """The view with a size of its own that a node draws with, or that its per-texel inputs were drawn with."""
         for given, links in draft.links.items():
             port = draft.inputs[given]
@@ -310,13 +310,8 @@ class TextureInference:
                 end = Endpoint(maker, name)
                 table = self.nodes[end.node].ports[end.port]
                 if isinstance(table, Views) and table.size is not None:
-                    return end
+                    return end, table
         return None
-
-    def _view_size(self, end: Endpoint) -> tuple[int, int]:
-        table = self.nodes[end.node].ports[end.port]
-        assert isinstance(table, Views)
-        return self._size(end, table, None)
 
     def _view_lights(self, end: Endpoint, port: Views) -> tuple[int, ...]:
         return tuple(self._checked_value(end, "lights", port.lights, _LIGHTS)) if port.lights else ()

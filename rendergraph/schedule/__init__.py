@@ -107,10 +107,8 @@ def schedule(
     """
     if len(expansion.steps) > MOST_STEPS:
         (node, most), *_ = Counter(step.node for step in expansion.steps).most_common(1)
-        text = (
-            f"the pipeline has {len(expansion.steps)} steps, more than {MOST_STEPS}; {most} of them belong to node "
-            f"'{node}': lower its counts, or use another node if it records a step for each light"
-        )
+        text = f"the pipeline has {len(expansion.steps)} steps, more than {MOST_STEPS}; {most} of them belong to node "
+        text += f"'{node}': lower its counts, or use another node if it records a step for each light"
         raise InputError(Problem("RG606", text))
     versions = Versions.of(expansion.steps)
     kept = contributing(expansion.steps, expansion.resources, expansion.outputs, versions, expansion.idle)

@@ -282,11 +282,8 @@ def _unwritten(step: Step, resource: str, versions: Versions, idle: Mapping[str,
     if maker != step.node and not versions.writers.get(resource):
         text = f"node '{step.node}' reads '{resource}', but no step of '{maker}' writes it; write it in its `record`"
         return Problem("RG604", text, step.where.place, subject=resource)
-    text = (
-        f"it reads '{resource}', but no step has written it by then; "
-        "write it in an earlier step, or declare it `History` to read last frame's value"
-    )
-    return step.problem("RG601", text)
+    text = f"it reads '{resource}', but no step has written it by then; write it in an earlier step, or declare it "
+    return step.problem("RG601", text + "`History` to read last frame's value")
 
 
 def _cycle(waits: Waits, edges: Sequence[tuple[StepKey, StepKey]], steps: Mapping[StepKey, Step]) -> Problem:
@@ -299,10 +296,6 @@ def _cycle(waits: Waits, edges: Sequence[tuple[StepKey, StepKey]], steps: Mappin
     resource, _ = waits[edges[start][1]][edges[start][0]]
     back = edges[(start + 1) % len(edges)]
     needed, _ = waits[back[1]][back[0]]
-    return Problem(
-        "RG602",
-        f"'{reader}' must run before '{writer}', which overwrites '{resource}', but also after it, "
-        f"as it depends on '{needed}'; let '{reader}' take '{resource}' from '{writer}' "
-        f"or the rest from before it",
-        steps[one].where.place,
-    )
+    text = f"'{reader}' must run before '{writer}', which overwrites '{resource}', but also after it, as it depends on "
+    text += f"'{needed}'; let '{reader}' take '{resource}' from '{writer}' or the rest from before it"
+    return Problem("RG602", text, steps[one].where.place)
