@@ -31,26 +31,31 @@ def selected(scene: Scene, name: str) -> list[int]:
 
 def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
     facts = []
+    traits = [
+        (scene.is_blended(one), scene.has_grain(one), scene.emits(one), scene.reflects(one), scene.layers(one))
+        for one in scene.materials
+    ]
     for placed in scene.objects:
         mesh, material = scene.meshes[placed.mesh], scene.materials[placed.material]
+        blended, grain, emissive, reflective, layers = traits[placed.material]
         facts.append(
             ObjectFacts(
                 placed.name,
                 len(mesh.indices),
                 len(mesh.positions),
                 placed.casts_shadow,
-                scene.is_blended(material),
+                blended,
                 material.double_sided,
                 placed.hidden,
-                scene.has_grain(material),
-                scene.emits(material),
-                scene.reflects(material),
+                grain,
+                emissive,
+                reflective,
                 mesh.name,
                 partial(attrgetter("edges.gap"), mesh),
                 partial(attrgetter("plane"), mesh),
                 partial(attrgetter("convex"), mesh),
                 placed.extra,
-                scene.layers(material),
+                layers,
             )
         )
     return tuple(facts)
