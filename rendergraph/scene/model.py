@@ -38,6 +38,7 @@ FARTHEST = 1e12
 """Limit of numbers in a mesh: products of a few larger ones would exceed single precision."""
 
 _LAYERED = ("clearcoat", "sheen_color", "iridescence", "transmission", "shadow_catcher")
+_NONE = 0.0, (0.0, 0.0, 0.0)  # values of these without a layer
 _REFLECTANCE = ("ior", "specular", "specular_color")
 _MOST_CONVEX = 10_000_000
 """Limit of pairs of vertex and triangle in the test for convexity: about a tenth of a second."""
@@ -489,7 +490,7 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
 
     def layers(self, material: Material) -> tuple[str, ...]:
         """Return which of clearcoat, sheen, iridescence and transmission a material has at any time."""
-        has = (key for key in _LAYERED if np.any(getattr(material, key)) or self._changes(material, key))
+        has = (key for key in _LAYERED if getattr(material, key) not in _NONE or self._changes(material, key))
         return () if material.unlit else tuple(key.removesuffix("_color") for key in has)
 
     def is_blended(self, material: Material) -> bool:
