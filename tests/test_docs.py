@@ -361,7 +361,6 @@ def test_every_page_of_the_gallery_has_a_picture() -> None:
     assert not without
 
 
-@pytest.mark.slow
 def sentences(text: str) -> Iterator[str]:
     """The sentences of a page's prose, with a word in place of each piece of code or formula."""
     text = re.sub(r"```.*?```|\$\$.*?\$\$", "", text, flags=re.S)
@@ -389,6 +388,13 @@ def test_every_exercise_has_its_answer() -> None:
         for part in re.findall(r"^## Exercises\n(.*?)(?=^## |\Z)", page.read_text(), re.S | re.M):
             asked = re.split(r"(?m)^(?=\d+\. )", part)[1:]
             assert [item for item in asked if "<summary>Answer</summary>" not in item] == [], page.name
+
+
+def test_folded_text_stands_between_blank_lines() -> None:
+    """Without them it is HTML to a reader of Markdown, who then sees the source of formulas, links and code."""
+    for page in PAGES:
+        for folded in re.findall(r"<details>.*?</details>", page.read_text(encoding="utf-8"), re.S):
+            assert re.search(r"</summary>\n\n(.*\S)\n\n *</details>$", folded, re.S), f"{page.name}: {folded}"
 
 
 def test_names_for_node_authors_are_all_documented(generated: Path) -> None:
