@@ -12,6 +12,7 @@ import importlib
 import inspect
 import re
 import shlex
+import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,14 +55,15 @@ class Block:
 
 
 def blocks(page: Path) -> Iterator[Block]:
+    """All fenced blocks, those in items of lists without their indentation."""
     text = page.read_text(encoding="utf-8")
-    for found in re.finditer(r"^(`{3,})(\w+)\n(.*?)^\1$", text, re.MULTILINE | re.DOTALL):
-        yield Block(text.count("\n", 0, found.start()) + 1, found[2], found[3])
+    for found in re.finditer(r"^( *)(`{3,})(\w+)\n(.*?)^\1\2$", text, re.MULTILINE | re.DOTALL):
+        yield Block(text.count("\n", 0, found.start()) + 1, found[3], textwrap.dedent(found[4]))
 
 
 def commands_in_the_text(page: Path) -> list[str]:
     """`rendergraph …` between backticks, those with words of their own; what stands in blocks is run."""
-    text = re.sub(r"^(`{3,}).*?^\1$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"^( *`{3,}).*?^\1$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
     found = [" ".join(words.split()) for words in re.findall(r"`(rendergraph [^`]+)`", text)]
     return [command for command in dict.fromkeys(found) if " " in command.removeprefix("rendergraph ")]
 
