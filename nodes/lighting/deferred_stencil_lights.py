@@ -20,8 +20,10 @@ class DeferredStencilLights(ImageLighting):
     radius, or without a range the extent of the view frustum. Its faces behind the surface increment and decrement the
     stencil, so that a nonzero value marks surfaces inside the volume, wherever the eye is (z-fail, Bilodeau and Songy
     1999). Then its back faces are drawn where the stencil is not zero, which also resets it for the next light.
-    Directional and ambient light take one full-screen pass. The geometry costs V, and each light only the F' pixels in
-    its volume: V + ΣF'. `deferred_lighting` renders the same picture for V + L F, with L lights and F pixels.
+    Directional and ambient light take one full-screen pass.
+
+    The cost is V + ΣF', where V is the number of vertices and F' the number of visible pixels inside the volume of one
+    light. `deferred_lighting` renders the same picture for V + L F, with L lights and F visible pixels.
     """
 
     radiance = Output(

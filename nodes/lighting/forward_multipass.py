@@ -10,9 +10,9 @@ from ._lighting import DIFFUSE, GeometryLighting, background_texel, rendered_sam
 class ForwardMultipass(GeometryLighting):
     """Light the scene in a first pass without lights and one additive pass per light.
 
-    This is how scenes with many lights were rendered before shaders could loop. Every light costs the whole geometry
-    and all visible fragments again: L (V + F). Passes after the first use an equal depth test. Transparent surfaces
-    cannot be added up light by light, so they are drawn last, lit by all lights at once.
+    This is how scenes with many lights were rendered before shaders could loop. Every light draws all V vertices and
+    shades all F visible pixels again, so L lights cost L (V + F). Passes after the first use an equal depth test.
+    Transparent surfaces cannot be added up light by light, so they are drawn last, lit by all lights at once.
     """
 
     radiance = Output(
