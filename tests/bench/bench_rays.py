@@ -54,11 +54,12 @@ def plot(file: Path, costs: Sequence[tuple[int, float]]) -> None:
         x = 70 + 500 * (power - low) / (high - low)
         parts.append(f'<line x1="{x:.1f}" y1="30" x2="{x:.1f}" y2="250" stroke="#ddd"/>')
         parts.append(f'<text x="{x:.1f}" y="270" text-anchor="middle">{10**power:,}</text>')
-    for number in range(5):
-        value = top * number / 4
+    step = min((step for step in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50) if top / step < 6), default=100.0)
+    for number in range(int(top / step) + 1):
+        value = step * number
         y = 250 - 220 * value / top
         parts.append(f'<line x1="70" y1="{y:.1f}" x2="570" y2="{y:.1f}" stroke="#ddd"/>')
-        parts.append(f'<text x="62" y="{y + 5:.1f}" text-anchor="end">{value:.2g}</text>')
+        parts.append(f'<text x="62" y="{y + 5:.1f}" text-anchor="end">{value:g}</text>')
     line = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
     parts.append(f'<polyline points="{line}" fill="none" stroke="#1f5fa8" stroke-width="2"/>')
     parts += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="#1f5fa8"/>' for x, y in points]

@@ -72,7 +72,8 @@ def bench(frames: int, turns: int, folder: str | None) -> tuple[list[Cell], str]
                 picture = np.asarray(session.render(whole)[next(iter(makes))])
                 if not np.isfinite(picture).all() or np.ptp(picture) < 0.3:
                     raise SystemExit(f"{name}: the picture is empty")
-                save(folder, **{f"{name}-{samples}": picture[..., :3] if node == "gi" else np.repeat(picture, 3, -1)})
+                picture = picture[..., :3] if node == "gi" else np.repeat(picture[..., None], 3, -1)
+                save(folder, **{f"{name}-{samples}": picture})
                 turn = [[_time(session, made, frames) for made in (bare, whole, half_size)] for _ in range(turns)]
                 full = [row[1] - row[0] for row in turn]
                 half = [row[2] - row[0] for row in turn]
@@ -84,7 +85,7 @@ def bench(frames: int, turns: int, folder: str | None) -> tuple[list[Cell], str]
                         min(full),
                         max(full),
                         statistics.median(half),
-                        float(picture[..., :3].mean()),
+                        float(picture.mean()),
                     )
                 )
         return cells, session.device.renderer

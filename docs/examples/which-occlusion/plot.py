@@ -54,10 +54,11 @@ def main() -> None:
         'fill="#333"><rect width="640" height="370" fill="white"/>',
         f'<text x="{LEFT}" y="24" font-weight="bold">RMSE against ray tracing over milliseconds</text>',
     ]
-    for number in range(5):
-        _, y = at(times[0], top * number / 4)
+    step = 0.01 if top <= 0.05 else 0.02 if top <= 0.1 else 0.05
+    for number in range(int(top / step + 1e-6) + 1):
+        _, y = at(times[0], step * number)
         out.append(f'<path d="M{LEFT},{y:.1f}h{WIDE}" stroke="#ddd"/>')
-        out.append(f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{top * number / 4:.3f}</text>')
+        out.append(f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{step * number:.2f}</text>')
     for power in range(math.ceil(low), math.floor(high) + 1):
         x, _ = at(2**power, 0)
         out.append(f'<text x="{x:.1f}" y="{TOP + TALL + 18}" text-anchor="middle">{2**power}</text>')

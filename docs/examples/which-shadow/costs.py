@@ -95,8 +95,13 @@ def points(out: Path) -> dict[str, Points]:
     return {what: {name: sorted(line) for name, line in lines.items()} for what, lines in found.items()}
 
 
+def _ticks(low: float, high: float, base: int) -> list[float]:
+    """The powers of a base from low to high."""
+    return [base**power for power in range(-8, 32) if low <= base**power <= high]
+
+
 def panel(lines: Points, which: int, left: float, top: float, title: str) -> list[str]:
-    """One plot, both axes doubling."""
+    """One plot with logarithmic axes: milliseconds by powers of ten, everything else by powers of two."""
     from math import ceil, floor, log2
 
     xs = sorted({count for line in lines.values() for count, *_ in line})
@@ -108,12 +113,11 @@ def panel(lines: Points, which: int, left: float, top: float, title: str) -> lis
         return left + 8 + (WIDE - 16) * across, top + TALL * (high - log2(value)) / (high - low)
 
     out = [f'<text x="{left}" y="{top - 10}" font-weight="bold">{title}</text>']
-    for power in range(low, high + 1, max(1, (high - low) // 5)):
-        y = at(xs[0], 2.0**power)[1]
+    for value in _ticks(2.0**low, 2.0**high, 10 if title.startswith("ms") else 2):
+        y = at(xs[0], value)[1]
         out.append(f'<path d="M{left},{y:.1f}h{WIDE}" stroke="#ddd"/>')
-        label = f"{2**power}" if power >= 0 else f"1/{2**-power}"
-        out.append(f'<text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{label}</text>')
-    for count in xs:
+        out.append(f'<text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>')
+    for count in xs if xs[-1] < 4000 else _ticks(xs[0], xs[-1], 10):
         label = f"{count / 1000:.0f}k" if count >= 4000 else f"{count}"
         out.append(f'<text x="{at(count, 1)[0]:.1f}" y="{top + TALL + 16}" text-anchor="middle">{label}</text>')
     for name, color in COLORS.items():
