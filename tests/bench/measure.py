@@ -183,7 +183,7 @@ def report(rows: Sequence[Row], as_json: bool, **more: Any) -> None:
 def markdown(device: str, size: tuple[int, int], heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table with its first column to the left, beneath what drew it."""
     lines = [
-        f"On {device}, {size[0]}×{size[1]}; a software rasteriser's times are not comparable to a GPU.",
+        f"On {device}, {size[0]}×{size[1]}.",
         "",
         *(f"| {' | '.join(cells)} |" for cells in (heads, ["---", *["---:"] * (len(heads) - 1)], *rows)),
     ]
