@@ -71,6 +71,7 @@ class Picture(Struct, frozen=True, forbid_unknown_fields=True):
         columns: panels of a row; all are in one by default.
         gap: white pixels between panels.
         labels: texts that are written into the panels.
+        label_size: size of their font in pixels; by default it follows from the width of a row.
         inset: x, y, width and height of a part of every panel that is magnified below it, in pixels of what is shown.
         reference: number of the panel, from 0, whose differences from the others are shown in false colour below them.
         top: the difference, as a share of white, of the brightest of these colours.
@@ -87,6 +88,7 @@ class Picture(Struct, frozen=True, forbid_unknown_fields=True):
     columns: int = 0
     gap: int = 0
     labels: tuple[str, ...] = ()
+    label_size: int = 0
     inset: tuple[int, int, int, int] | None = None
     reference: int = -1
     top: float = 0.25
@@ -198,7 +200,9 @@ def draw(name: str, picture: Picture, place: Path) -> Path:
         shutil.copy(file, made)
         return made
     columns = picture.columns or len(panels)
-    layout = Layout(columns, picture.gap, picture.labels, picture.inset, picture.reference, picture.top)
+    layout = Layout(
+        columns, picture.gap, picture.labels, picture.label_size, picture.inset, picture.reference, picture.top
+    )
     save(made, laid_out(panels, layout, details))
     return made
 

@@ -36,6 +36,7 @@ class Layout(Struct, frozen=True):
         columns: panels of a row.
         gap: white pixels between everything.
         labels: texts in the panels' upper left corners, in their order; an empty one is none. The font has ASCII alone.
+        label_size: size of the font in pixels; 0 chooses it by the width of a row.
         inset: x, y, width and height of a part of each panel, in pixels, which is shown below it as wide as it is.
         reference: number of the panel that the others are compared with, counted from 0; -1 for none.
         top: the error, as a share of white, that the brightest colour stands for.
@@ -44,6 +45,7 @@ class Layout(Struct, frozen=True):
     columns: int
     gap: int = 0
     labels: Sequence[str] = ()
+    label_size: int = 0
     inset: tuple[int, int, int, int] | None = None
     reference: int = -1
     top: float = 0.25
@@ -58,7 +60,7 @@ def laid_out(panels: Sequence[Bytes], layout: Layout, details: Sequence[Bytes] |
     details = panels if details is None else details
     rows: list[list[Bytes]] = []
     widest = max(sum(panel.shape[1] for panel in panels[: layout.columns]), 1)
-    size = max(12, round(widest / 64))
+    size = layout.label_size or max(12, round(widest / 64))
     for start in range(0, len(panels), layout.columns):
         row = list(panels[start : start + layout.columns])
         labels = [*layout.labels, *[""] * len(panels)][start : start + layout.columns]

@@ -25,8 +25,11 @@ def plot(rows: Sequence[Mapping[str, Any]], device: str) -> str:
         rows: `pipeline`, `samples` and `ms` of each measurement.
         device: named beneath, for its times are its own.
     """
-    step = 10 ** math.floor(math.log10(max(row["ms"] for row in rows)))
-    top = math.ceil(max(row["ms"] for row in rows) / step) * step
+    slowest = max(row["ms"] for row in rows)
+    power = 10 ** math.floor(math.log10(slowest))
+    step = next(share * power for share in (0.2, 0.5, 1, 2) if slowest / (share * power) <= 5)
+    lines = math.ceil(slowest / step)
+    top = lines * step
     most = max(row["samples"] for row in rows)
 
     def at(samples: float, ms: float) -> tuple[float, float]:
@@ -38,10 +41,10 @@ def plot(rows: Sequence[Mapping[str, Any]], device: str) -> str:
         f'<rect width="{WIDTH}" height="{HEIGHT}" fill="white"/>',
         f'<text x="{LEFT}" y="{TOP - 18}" font-weight="bold">CPU milliseconds of `ao` or `gi` against samples</text>',
     ]
-    for number in range(5):
-        _, y = at(0, top * number / 4)
+    for number in range(lines + 1):
+        _, y = at(0, step * number)
         out.append(f'<path d="M{LEFT},{y:.1f}h{WIDE}" stroke="#ddd"/>')
-        out.append(f'<text x="{LEFT - 8}" y="{y + 4:.1f}" text-anchor="end">{top * number / 4:g}</text>')
+        out.append(f'<text x="{LEFT - 8}" y="{y + 4:.1f}" text-anchor="end">{step * number:g}</text>')
     for samples in sorted({row["samples"] for row in rows}):
         x, y = at(samples, 0)
         out.append(f'<text x="{x:.1f}" y="{y + 18:.1f}" text-anchor="middle">{samples}</text>')

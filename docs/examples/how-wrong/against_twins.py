@@ -1,7 +1,7 @@
 """Hold every technique against its traced twin: `python against_twins.py [FOLDER] [shadows] [occlusion] [light]`.
 
-Tables go to stdout. A folder gets a picture of each family, with the truth first and then the techniques: a magnified
-part above, and its signed error below (red is too dark, blue too bright). In `how-wrong-fails.png` the truth itself has
+Tables go to stdout. A folder gets a picture of each family, with a magnified part of the truth and the same part of
+every technique above its signed error (red is too dark, blue too bright). In `how-wrong-fails.png` the truth itself has
 too few rays.
 """
 
@@ -22,6 +22,8 @@ from rendergraph import images
 
 Floats = npt.NDArray[np.float32]
 GAP = 8
+LABEL = 19
+FRAME = 200
 SHADOWS = {
     "shadow_map": "shadow-map",
     "shadow_pcf": "shadow-pcf",
@@ -97,34 +99,52 @@ def table(title: str, truth: Floats, found: dict[str, Floats], mask: npt.NDArray
         print(f"| `{name}` | {rmse:.4f} | {off.mean():+.4f} | {100 * far:.1f} % | {energy:.2f} |", flush=True)
 
 
+def errors(panel: Floats, truth: Floats, mask: npt.NDArray[np.bool_], part: tuple[slice, slice], gain: float) -> Floats:
+    """Return the signed error of a part, (height, width, 3): red is too dark, blue too bright, white is no error."""
+    off = gain * ((panel - truth).mean(-1) * mask)[part]
+    dark, bright = np.maximum(-off, 0), np.maximum(off, 0)
+    return np.asarray(1 - np.stack([bright, dark + bright, dark], -1))
+
+
 def sheet(
-    panels: dict[str, Floats],
+    found: dict[str, Floats],
     truth: Floats,
     mask: npt.NDArray[np.bool_],
     crop: tuple[int, int, int, int],
     enlarge: int,
     gain: float,
+    columns: int,
 ) -> npt.NDArray[np.uint8]:
-    """Return parts of panels with their names, four in a row, and their errors below them; white is no error."""
+    """Return a part of the truth, twice as large, and right of it and below the techniques, each above its error."""
     x, y, width, height = crop
     part = slice(y, y + height), slice(x, x + width)
-    shown, wrong = [], []
-    for panel in panels.values():
-        off = gain * ((panel - truth).mean(-1) * mask)[part]
-        dark, bright = np.maximum(-off, 0), np.maximum(off, 0)
-        wrong.append(1 - np.stack([bright, dark + bright, dark], -1))
-        shown.append(
-            np.broadcast_to(panel[part], (height, width, 3)) ** np.float32(1 if panel.shape[-1] == 1 else 1 / 2.2)
-        )
-    columns = min(4, len(panels))
-    tiles, labels = [], []
-    for start in range(0, len(panels), columns):
-        names = list(panels)[start : start + columns]
-        blank = [np.ones((height, width, 3))] * (columns - len(names))
-        tiles += [*shown[start : start + columns], *blank, *wrong[start : start + columns], *blank]
-        labels += [*names, *[""] * (2 * columns - len(names))]
-    large = [np.repeat(np.repeat(np.clip(tile, 0, 1), enlarge, 0), enlarge, 1) for tile in tiles]
-    return laid_out([(tile * 255 + 0.5).astype(np.uint8) for tile in large], Layout(columns, GAP, labels))
+
+    def tile(panel: Floats) -> Floats:
+        return np.broadcast_to(panel[part], (height, width, 3)) ** np.float32(1 if panel.shape[-1] == 1 else 1 / 2.2)
+
+    def block(names: list[str]) -> npt.NDArray[np.uint8]:
+        wrong = [framed(enlarged(errors(found[name], truth, mask, part, gain), enlarge)) for name in names]
+        shown = [enlarged(tile(found[name]), enlarge) for name in names]
+        return laid_out([*shown, *wrong], Layout(len(names), GAP, names, label_size=LABEL))
+
+    names = list(found)
+    beside, below = names[: columns - 2], names[columns - 2 :]
+    right = block(beside)
+    large = enlarged(tile(truth), 2 * enlarge)
+    large = np.pad(large, ((0, GAP), (0, GAP), (0, 0)), mode="edge")  # as high as two rows with the gap between them
+    top = laid_out([large, right], Layout(2, GAP, ["rays"], label_size=LABEL))
+    return laid_out([top, *([block(below)] if below else [])], Layout(1, GAP))
+
+
+def enlarged(tile: Floats, times: int) -> npt.NDArray[np.uint8]:
+    """Return a tile with every pixel repeated, as bytes."""
+    return np.repeat(np.repeat((np.clip(tile, 0, 1) * 255 + 0.5).astype(np.uint8), times, 0), times, 1)
+
+
+def framed(tile: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    """Return a tile with a thin grey line around it, which shows where a white one ends."""
+    tile[[0, -1]], tile[:, [0, -1]] = FRAME, FRAME
+    return tile
 
 
 def shadows(session: rg.Session, folder: Path | None) -> None:
@@ -137,7 +157,7 @@ def shadows(session: rg.Session, folder: Path | None) -> None:
     table("Shadows of a sun without a size", hard, found, mask)
     table("Shadows of a sun 0.05 rad wide", soft, found, mask)
     if folder:
-        fine, crop = Shots(session, "shadow_study", (640, 360)), (400, 215, 100, 80)
+        fine, crop = Shots(session, "shadow_study", (640, 360)), (425, 225, 64, 52)
         mask, hard = fine.lit(), fine.draw("traced-shadows", port, "shadows.angle=0")
         names = (
             "shadow_map",
@@ -147,12 +167,13 @@ def shadows(session: rg.Session, folder: Path | None) -> None:
             "shadow_msm",
             "shadow_convolution",
             "shadow_pcss",
+            "shadow_volumes",
         )
-        shown = {"rays": hard, **{name: fine.draw(SHADOWS[name], port) for name in names}}
-        images.write(folder / "how-wrong-shadows.png", sheet(shown, hard, mask, crop, 3, 1))
+        shown = {name: fine.draw(SHADOWS[name], port) for name in names}
+        images.write(folder / "how-wrong-shadows.png", sheet(shown, hard, mask, crop, 4, 1, 5))
         soft = fine.draw("traced-shadows", port, "shadows.samples=48")
-        shown = {"rays": soft, **{name: shown[name] for name in ("shadow_pcss", "shadow_pcf", "shadow_map")}}
-        images.write(folder / "how-wrong-penumbra.png", sheet(shown, soft, mask, crop, 3, 1))
+        shown = {name: shown[name] for name in ("shadow_pcss", "shadow_pcf", "shadow_map")}
+        images.write(folder / "how-wrong-penumbra.png", sheet(shown, soft, mask, crop, 4, 1, 5))
     room = Shots(session, "lantern", (320, 180))
     traced = room.draw("shadow-cube", port, "shadows.type=traced_shadows")
     bulbs = {name: room.draw(pipeline, port) for name, pipeline in BULBS.items()}
@@ -171,11 +192,12 @@ def occlusion(session: rg.Session, folder: Path | None) -> None:
     table("Occlusion", exact, found, mask)
     if folder:
         crop = 70, 70, 60, 60
-        images.write(folder / "how-wrong-occlusion.png", sheet({"rays": exact, **found}, exact, mask, crop, 5, 4))
+        images.write(folder / "how-wrong-occlusion.png", sheet(found, exact, mask, crop, 5, 4, 4))
         rough = stairs.draw("traced-occlusion", "ao.occlusion", "ao.radius=1", "ao.samples=8")
-        parts = [sheet({"gtao": found["gtao"]}, truth, mask, crop, 8, 4)[60 * 8 + GAP :] for truth in (exact, rough)]
-        errors = laid_out(parts, Layout(2, GAP, ["against 256 rays", "against 8 rays"]))
-        images.write(folder / "how-wrong-fails.png", errors)
+        part = slice(70, 130), slice(70, 130)
+        parts = [framed(enlarged(errors(found["gtao"], truth, mask, part, 4), 8)) for truth in (exact, rough)]
+        both = laid_out(parts, Layout(2, GAP, ["against 256 rays", "against 8 rays"]))
+        images.write(folder / "how-wrong-fails.png", both)
 
 
 def light(session: rg.Session, folder: Path | None) -> None:
@@ -187,8 +209,7 @@ def light(session: rg.Session, folder: Path | None) -> None:
     found = {name: box.draw(pipeline, port, "gi.samples=64")[..., :3] for name, pipeline in LIGHT.items()}
     table("Light between surfaces", exact, found, mask)
     if folder:
-        shown = sheet({"rays": exact, **found}, exact, mask, (62, 40, 64, 60), 5, 4)
-        images.write(folder / "how-wrong-light.png", shown)
+        images.write(folder / "how-wrong-light.png", sheet(found, exact, mask, (62, 40, 64, 60), 5, 4, 4))
 
 
 FAMILIES = {"shadows": shadows, "occlusion": occlusion, "light": light}
