@@ -73,7 +73,8 @@ class Shots:
     def draw(self, pipeline: str, port: str, *sets: str) -> Floats:
         """Return what a port holds, shape (height, width, channels): the first layer, without a guard band."""
         loaded = rg.load(pipeline, scene=self.scene, size=self.size, sets=sets)
-        found = np.asarray(self.session.render(loaded, outputs=["radiance"], taps=[port])[port], np.float32)
+        frame = self.session.render(loaded, outputs=["radiance"], taps=[port])
+        found = np.asarray(frame.arrays[port], np.float32)
         found = found[0] if found.ndim == 4 else found
         width, height = self.size
         y, x = (found.shape[0] - height) // 2, (found.shape[1] - width) // 2
