@@ -24,6 +24,7 @@ from typing import Any
 
 from msgspec import ValidationError, convert, to_builtins
 
+from rendergraph.authoring.harness import Report
 from rendergraph.catalog.types import SHADERS
 from rendergraph.declare.blame import cause_chain, describe_error, source_location
 from rendergraph.errors import DeviceError, InputError, Place, Problem, RenderError, RendergraphError, shown_file
@@ -45,19 +46,6 @@ class CheckLimits:
     import_seconds: float = 10
     pass_seconds: float = 30
     memory: int = 2 << 30
-
-
-@dataclass(frozen=True)
-class Report:
-    """The result of a check: the type's name, the rendered variants in order, mistakes and warnings."""
-
-    node: str
-    variants: tuple[str, ...]
-    problems: tuple[Problem, ...]
-
-    @property
-    def mistakes(self) -> tuple[Problem, ...]:
-        return tuple(problem for problem in self.problems if problem.severity == "error")
 
 
 def check_node(

@@ -15,8 +15,7 @@ from typing import Literal
 
 from msgspec.structs import asdict
 
-from rendergraph.authoring.check_process import Report
-from rendergraph.authoring.harness import NodeVariant, variants
+from rendergraph.authoring.harness import NodeVariant, Report, variants
 from rendergraph.authoring.node_check import SCENE, NodeCheck
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.catalog.types import shared_includes

@@ -17,6 +17,7 @@ from typing import Any
 from rendergraph import api
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import Input, Node
+from rendergraph.errors import Problem
 from rendergraph.ports import Samples
 from rendergraph.textures import FORMATS, TEXTURE_KINDS, TextureDesc
 
@@ -38,6 +39,19 @@ FROM = "from-"  # prefix of outputs that show a source; no port begins like this
 
 MOST_VARIANTS = 200
 """Maximum number of variants of one node; further ones are not rendered."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """The result of a check: the type's name, the rendered variants in order, mistakes and warnings."""
+
+    node: str
+    variants: tuple[str, ...]
+    problems: tuple[Problem, ...]
+
+    @property
+    def mistakes(self) -> tuple[Problem, ...]:
+        return tuple(problem for problem in self.problems if problem.severity == "error")
 
 
 @dataclass(frozen=True)

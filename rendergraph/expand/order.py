@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from rendergraph.declare import Function, InOut, Input, Part
 from rendergraph.errors import InputError, Problem
-from rendergraph.expand.recording import part_of, written_names
-from rendergraph.link import Endpoint
+from rendergraph.expand.recording import Recording, part_of, written_names
+from rendergraph.link import Endpoint, Graph
 from rendergraph.link.graph import upstream_first
 
-if TYPE_CHECKING:
-    from rendergraph.expand.versions import VersionAssignment
-
 _Step: TypeAlias = tuple[str, int]
+_Follow: TypeAlias = Callable[[Endpoint], Endpoint]
 _Cause: TypeAlias = tuple[str, str, Endpoint]
 """Why a step waits for another: the reading node, its input or port, and the source of the link."""
 
 
-def step_order(found: VersionAssignment) -> list[_Step]:
+def step_order(graph: Graph, recordings: Mapping[str, Recording], follow: _Follow) -> list[_Step]:
     """Return node and number of every recorded step in topological order; raise RG117 if there is a cycle."""
-    order = _StepOrder(found)
-    steps = [(name, number) for name, one in found.recordings.items() for number in range(len(one.requests))]
+    order = _StepOrder(graph, recordings, follow)
+    steps = [(name, number) for name, one in recordings.items() for number in range(len(one.requests))]
     waits = {(name, number): order.waits(name, number) for name, number in steps}
     sorted_steps = upstream_first(waits)
     if len(sorted_steps) < len(waits):
@@ -34,8 +32,8 @@ def step_order(found: VersionAssignment) -> list[_Step]:
 
 
 class _StepOrder:
-    def __init__(self, found: VersionAssignment) -> None:
-        self.graph, self.recordings, self.follow = found.graph, found.recordings, found.follow
+    def __init__(self, graph: Graph, recordings: Mapping[str, Recording], follow: _Follow) -> None:
+        self.graph, self.recordings, self.follow = graph, recordings, follow
         self.writers: dict[Endpoint, list[int]] = defaultdict(list)
         for name, recording in self.recordings.items():
             for number, request in enumerate(recording.requests):

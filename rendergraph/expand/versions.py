@@ -125,7 +125,7 @@ class VersionAssignment:
 
         for recording in self.recordings.values():
             self._declare(recording)
-        for name, number in step_order(self):
+        for name, number in step_order(self.graph, self.recordings, self.follow):
             self.steps.append(self._step(self.recordings[name], number))
         for recording in self.recordings.values():
             for end in recording.own.values():
