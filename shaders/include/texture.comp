@@ -14,7 +14,7 @@ uniform int points;  // along each side of a texel
 ivec2 size;
 
 float height_at(ivec2 texel) {
-    return imageLoad(fields, (texel + 4 * size) % size).r;
+    return imageLoad(fields, wrapped(texel, size)).r;
 }
 
 void sample_texel(ivec2 texel) {
