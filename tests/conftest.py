@@ -8,7 +8,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from functools import lru_cache, wraps
+from functools import lru_cache
 from pathlib import Path
 from textwrap import dedent, indent
 from typing import Any, ClassVar
@@ -18,10 +18,7 @@ import pytest
 import rendergraph as rg
 from rendergraph.api import Node
 from rendergraph.catalog import Catalog
-from rendergraph.compile.generated import Maps, TextureGenerator
 from rendergraph.errors import RendergraphError
-from rendergraph.program.text import StageText
-from rendergraph.scene.model import GeneratedTexture
 from rendergraph.session import gpu
 from rendergraph.session.gpu import Gpu
 from rendergraph.session.gpu_cache import GpuCache
@@ -41,6 +38,10 @@ from rendergraph.api import Any as AnyTexel
 '''
 PIPELINE = "nodes:\n  a: {type: wrong}\noutputs: {image: a.color}\n"
 WHITE = "out vec4 color;\nvoid main() { color = vec4(1.0); }\n"
+
+os.environ.setdefault(
+    "RENDERGRAPH_CACHE", str(Path(__file__).parents[1] / ".cache" / "rendergraph")
+)  # shared by all processes
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -87,21 +88,11 @@ def shared() -> Path:
 
 @pytest.fixture(scope="session", autouse=True)
 def made_pictures() -> Iterator[None]:
-    """Keep pictures of skies and generated textures, as many tests use the same ones and each takes a fifth of a second."""
+    """Keep pictures of skies, as many tests use the same ones and each takes a fifth of a second."""
     from rendergraph.pipelines.environments import sky
-
-    evaluate, made = TextureGenerator._evaluate, {}
-
-    @wraps(evaluate)
-    def evaluated(self: TextureGenerator, text: StageText, texture: GeneratedTexture) -> Maps:
-        key = self.programs.device.renderer, text.text, texture.values
-        if key not in made:
-            made[key] = evaluate(self, text, texture)
-        return made[key]
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sky, "sky_picture", lru_cache(32)(sky.sky_picture))
-        patch.setattr(TextureGenerator, "_evaluate", evaluated)
         yield
 
 

@@ -123,7 +123,6 @@ def test_blocks_of_a_page(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("RENDERGRAPH_TRACEBACK", "1")
-    monkeypatch.setenv("RENDERGRAPH_CACHE", str(tmp_path / "cache"))
     for block in blocks(page):
         where = f"{page.name}:{block.line}"
         if block.file:

@@ -8,15 +8,11 @@ is the sum of both.
 
 from __future__ import annotations
 
-import contextlib
-import io
 import itertools
 import math
-import os
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -26,9 +22,8 @@ from rendergraph.compare.light import LIGHT, displayed, with_light
 from rendergraph.compare.prepare import Run, TruthLimits, Twin
 from rendergraph.compare.results import Reference
 from rendergraph.compare.tasks import ReferenceResult, origin_of
-from rendergraph.errors import RenderError
 from rendergraph.farm import Handle, Task, Worker
-from rendergraph.images.files import write_file
+from rendergraph.images.cache import DiskCache
 from rendergraph.metrics import Encoding, colors, measure, relative_mse, relative_noise
 from rendergraph.session import RenderOptions, stages
 
@@ -42,8 +37,7 @@ TWIN_FRAMES = 16
 """Frames to average for a twin's light: a single frame of a traced twin is noisy."""
 _LEAST_FRAMES = 2
 """After one frame, pixels whose few samples are all equal seem to have no variance."""
-_MOST_CACHED = 1 << 30
-"""Bytes of cached truths on the disk; the least recently used are removed."""
+_CACHE = DiskCache("truths", 1 << 30)
 _MOST_LIGHTS = 512 << 20
 """Bytes of the light of the runs, which is rendered first to know the smallest error."""
 
@@ -109,7 +103,7 @@ class TruthTask(Task):
                 else:
                     yield each
             assert found is not None  # it comes last
-            _save(self.key, found)
+            _CACHE.put(self.key, vars(found))
         base = self.base.plan(worker)
         assert self.base.light is not None
         lights = [found.radiance, found.with_noise_again()]
@@ -218,39 +212,11 @@ def _light(gpu: Gpu, planned: Planned, run: Run, frames: int = 1) -> Pixels:
 # --- the cache on the disk -------------------------------------------------------------------------------------------
 
 
-def cache_folder() -> Path:
-    """Return the folder of cached truths: in `RENDERGRAPH_CACHE`, or in the user's folder for caches."""
-    named = os.environ.get("RENDERGRAPH_CACHE")
-    base = Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "rendergraph"
-    return base / "truths"
-
-
 def _load(key: str) -> Truth | None:
     """Return the cached truth; None if there is none or it cannot be read."""
-    path = cache_folder() / f"{key}.npz"
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            truth = Truth(stored["radiance"], stored["variance"], int(stored["samples"]), float(stored["seconds"]))
-        os.utime(path)
-    except (OSError, ValueError, KeyError, EOFError):
+    if (stored := _CACHE.get(key)) is None:
         return None
-    return truth
-
-
-def _save(key: str, truth: Truth) -> None:
-    """Cache a truth. If the disk is full or read-only, it will only have to be rendered again."""
-    data = io.BytesIO()
-    np.savez(data, **vars(truth))
-    folder = cache_folder()
-    with contextlib.suppress(OSError, RenderError):
-        folder.mkdir(parents=True, exist_ok=True)
-        write_file(folder / f"{key}.npz", data.getvalue())
-        files = sorted(folder.glob("*.npz"), key=lambda path: path.stat().st_mtime, reverse=True)
-        total = 0
-        for file in files:
-            total += file.stat().st_size
-            if total > _MOST_CACHED:
-                file.unlink()
+    return Truth(stored["radiance"], stored["variance"], int(stored["samples"]), float(stored["seconds"]))
 
 
 def noise_note(reference: Reference, smallest: float | None, limits: TruthLimits) -> str | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,7 @@ from rendergraph.compile.programs import ProgramCache
 from rendergraph.gl import textures
 from rendergraph.glsl import Includes
 from rendergraph.glsl.source import generated
+from rendergraph.images.cache import DiskCache
 from rendergraph.program.text import VERSION, StageText
 from rendergraph.resources import folder
 from rendergraph.scene.model import GeneratedTexture, ImageSource
@@ -22,6 +23,7 @@ from rendergraph.textures import TextureDesc
 
 Maps: TypeAlias = Mapping[str, npt.NDArray[np.uint8]]
 _MOST_KEPT = 64 << 20
+_CACHE = DiskCache("textures", 256 << 20)  # on a CPU a texture takes half a second
 _POINTS = 2
 """Sample points along each side of a texel, which are averaged."""
 _FORMATS = ("rgba8", "rgba32f", "rgba8", "rgba8")
@@ -41,12 +43,16 @@ class TextureGenerator(Struct, eq=False):
         text = _text(source.generated.shader)
         key = text.text, source.generated.values
         if key not in self._kept:
-            self._kept[key] = self._evaluate(text, source.generated)
+            name = repr((*key, self.programs.device.renderer))
+            if (maps := _CACHE.get(name)) is None:
+                maps = self._evaluate(text, source.generated)
+                _CACHE.put(name, maps)
+            self._kept[key] = maps
             while len(self._kept) > 1 and sum(t.nbytes for m in self._kept.values() for t in m.values()) > _MOST_KEPT:
                 self._kept.pop(next(iter(self._kept)))
         return self._kept[key][source.generated.map]
 
-    def _evaluate(self, text: StageText, texture: GeneratedTexture) -> Maps:
+    def _evaluate(self, text: StageText, texture: GeneratedTexture) -> dict[str, npt.NDArray[Any]]:
         device, values = self.programs.device, dict(texture.values)
         side = values.pop("resolution")
         program = self.programs.get({"compute": text}, {}, ())

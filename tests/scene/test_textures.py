@@ -245,3 +245,13 @@ def test_texture_coordinates_in_metres(shape: str, values: dict[str, Any], lengt
     uv = mesh(shape, uv="metres", **values).uv0
     assert uv is not None
     assert np.ptp(uv, axis=0) == pytest.approx(lengths, rel=1e-3)
+
+
+def test_another_process_finds_the_same_texels_on_the_disk(
+    generator: TextureGenerator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RENDERGRAPH_CACHE", str(tmp_path / "cache"))
+    texture = read(tmp_path, "texture: {kind: noise, seed: 77, resolution: 64}").materials[0].textures["base_color"]
+    made = generator.texels(texture.image)
+    monkeypatch.setattr(TextureGenerator, "_evaluate", None)
+    assert np.array_equal(TextureGenerator(generator.programs).texels(texture.image), made)

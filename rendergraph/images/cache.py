@@ -1,0 +1,59 @@
+"""Arrays cached on the disk by content: true pictures, which take minutes, and generated textures."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.errors import RenderError
+from rendergraph.images.files import write_file
+
+
+class DiskCache:
+    """A folder of arrays, in `RENDERGRAPH_CACHE` or in the user's folder for caches. The oldest files go first.
+
+    A full or read-only disk is no error: what is not cached is made again.
+    """
+
+    def __init__(self, name: str, most_bytes: int) -> None:
+        self.name = name
+        self.most_bytes = most_bytes
+
+    def _file(self, key: str) -> Path:
+        named = os.environ.get("RENDERGRAPH_CACHE")
+        base = (
+            Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "rendergraph"
+        )
+        return base / self.name / f"{hashlib.sha256(key.encode()).hexdigest()}.npz"
+
+    def get(self, key: str) -> dict[str, npt.NDArray[Any]] | None:
+        """Return the arrays of a key; None if there are none or they cannot be read."""
+        file = self._file(key)
+        try:
+            with np.load(io.BytesIO(file.read_bytes()), allow_pickle=False) as stored:
+                arrays = dict(stored)
+            os.utime(file)
+        except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+            return None
+        return arrays
+
+    def put(self, key: str, arrays: Mapping[str, Any]) -> None:
+        data, file = io.BytesIO(), self._file(key)
+        np.savez(data, **arrays)
+        with contextlib.suppress(OSError, RenderError):
+            file.parent.mkdir(parents=True, exist_ok=True)
+            write_file(file, data.getvalue())
+            total = 0
+            for each in sorted(file.parent.glob("*.npz"), key=lambda path: path.stat().st_mtime, reverse=True):
+                total += each.stat().st_size
+                if total > self.most_bytes:
+                    each.unlink()
