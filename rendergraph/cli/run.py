@@ -181,7 +181,8 @@ def _read(
     named = []
     for target in targets:
         picture = target.path.with_suffix(".png") if is_film(target.path) else target.path  # films consist of pictures
-        extension(picture, ENDINGS)
+        if not target.is_tap:
+            extension(picture, ENDINGS)
         named.append(replace(target, name=target.name or images.output_for(picture, linked.graph.outputs)))
     wanted = dict.fromkeys((*(target.name for target in named if not target.is_tap), *figures(linked.graph)))
     tapped = dict.fromkeys(target.name for target in named if target.is_tap)

@@ -45,8 +45,8 @@ def with_formats(
         if match["name"] not in images:
             if _is_compiled(source, macros, match):
                 place = origins[number].place(match.start("name") + 1)
-                problem = step.problem("RG430", _unknown(step, match, images))
-                problems.append(replace(problem, line_text=line, place=place))
+                unknown = step.problem("RG430", _unknown(step, match, images))
+                problems.append(replace(unknown, line_text=line, place=place))
             continue
         use, desc = images[match["name"]]
         text = _mismatch(match, use, desc)

@@ -21,6 +21,11 @@ if TYPE_CHECKING:
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 
 
+def views_of(executable: Any) -> Any:
+    """The views of an executable with the lists of objects that are drawn in them."""
+    return executable.cull_and_sort.func.__self__.views.values()
+
+
 def _scattered(count: int) -> str:
     """Turned and stretched boxes of half a metre around the origin, two of three with a material of their own."""
     random = np.random.default_rng(count)
@@ -106,7 +111,7 @@ def test_pictures_are_the_same_to_the_last_bit(gl: Any, tmp_path: Path, pipeline
             for number, camera in enumerate(cameras, 1):
                 drawing.draw(number, camera)
                 found.append(drawing.read()["image"])
-                lists.append([len(one.drawn) for each in drawing.executable.scene_views for one in each.lists])
+                lists.append([len(one.drawn) for each in views_of(drawing.executable) for one in each.lists])
     for plain, culled in zip(*pictures, strict=True):
         np.testing.assert_array_equal(plain, culled)
     all_of_it, left = np.array(lists[: len(cameras)]), np.array(lists[len(cameras) :])
@@ -148,7 +153,7 @@ def test_commands_are_written_only_where_others_are_drawn(gl: Any, tmp_path: Pat
     with gl.device.current():
         drawing = gl.compile(made)
         drawing.begin()
-        lists = [one for each in drawing.executable.scene_views for one in each.lists]
+        lists = [one for each in views_of(drawing.executable) for one in each.lists]
         drawing.draw(1, camera)
         before = [one.drawn for one in lists]
         drawing.draw(2, Camera("any", turned, camera.type, camera.fov_y, near=camera.near, far=camera.far))

@@ -229,7 +229,7 @@ def mutants(value: Any) -> list[Any]:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "most", "every"),
-    [("scene", 10, 3), ("sweep", 100, 1), pytest.param("scene", 300, 1, marks=pytest.mark.nightly)],
+    [("scene", 20, 3), ("sweep", 100, 1), pytest.param("scene", 300, 1, marks=pytest.mark.nightly)],
 )
 def test_shipped_files_are_valid_and_mutants_are_as_the_walk_says(kind: str, most: int, every: int) -> None:
     table, validate, checked = table_of(kind), compiled(kind), 0
