@@ -14,9 +14,11 @@ import pytest
 import rendergraph as rg
 from rendergraph.compare.engine import compare
 from rendergraph.compare.report import comparison_page
-from rendergraph.compare.report.scatter import Point, scatter_svg
-from rendergraph.compare.results import Comparison
+from rendergraph.compare.report.scatter import scatter_svg
+from rendergraph.compare.results import Comparison, Result
+from rendergraph.compare.timing import Spread, Times
 from rendergraph.diagrams import svg
+from rendergraph.metrics import Metrics
 
 VOID = {"meta", "link", "img", "input", "path", "rect", "circle", "br"}
 
@@ -135,18 +137,26 @@ def test_names_are_text_everywhere(comparison: Comparison) -> None:
     assert read(page).scripts == 1
 
 
+def measured(name: str, label: str, ms: float, low: float, high: float, error: float) -> Result:
+    spread = Spread(ms, low, high, low, high)
+    times = Times(1, None, spread, spread, ())
+    return Result(name, "", None, "display", Metrics(0, None, 1, error), times, settings={"label": label})
+
+
 def test_a_scatter_shows_all_points_inside_and_the_front() -> None:
     import xml.etree.ElementTree as ET
 
-    points = [Point(f"n{i}", f"{i}", 1.0 + i, 0.9 + i, 1.2 + i, 0.3 / (1 + i), i % 2 == 0) for i in range(20)]
-    root = ET.fromstring(scatter_svg([*points, Point("nan", "n", 1, 1, 1, float("nan"), False)], "time", "error"))
+    results = [measured(f"n{i}", f"{i}", 1.0 + i, 0.9 + i, 1.2 + i, 0.3 / (1 + i)) for i in range(20)]
+    unknown = measured("nan", "n", 1, 1, 1, float("nan"))
+    best = {result.name for result in results[::2]}
+    root = ET.fromstring(scatter_svg([*results, unknown], best, "time", "error"))
     dots = list(root.iter("{http://www.w3.org/2000/svg}circle"))
     assert len(dots) == 20
     assert all(0 < float(dot.attrib["cx"]) < 760 and 0 < float(dot.attrib["cy"]) < 380 for dot in dots)
     assert sum(dot.attrib["class"] == "best" for dot in dots) == 10
-    ET.fromstring(scatter_svg([], "time", "error"))
-    ET.fromstring(scatter_svg([Point("zero", "z", 0, 0, 0, 0, True)], "time", "error"))
-    great = scatter_svg([Point("n", "n", 1700.0, 1600, 1900, 0.00016, True)], "time", "error")
+    ET.fromstring(scatter_svg([], (), "time", "error"))
+    ET.fromstring(scatter_svg([measured("zero", "z", 0, 0, 0, 0)], ["zero"], "time", "error"))
+    great = scatter_svg([measured("n", "n", 1700.0, 1600, 1900, 0.00016)], ["n"], "time", "error")
     assert ">2000</text>" in great
     assert ">0.0002</text>" in great
     assert "e+" not in great
@@ -155,10 +165,10 @@ def test_a_scatter_shows_all_points_inside_and_the_front() -> None:
 def test_no_line_goes_through_a_label() -> None:
     import re
 
-    points = [
-        Point(f"n{i}", f"radius {i}", 100.0 + 20 * i, 99 + 20 * i, 118 + 20 * i, 0.5 / (1 + i), True) for i in range(6)
+    results = [
+        measured(f"n{i}", f"radius {i}", 100.0 + 20 * i, 99 + 20 * i, 118 + 20 * i, 0.5 / (1 + i)) for i in range(6)
     ]
-    svg = scatter_svg(points, "time", "error")
+    svg = scatter_svg(results, {result.name for result in results}, "time", "error")
     labels = [
         (float(x), float(y) - 4, 6.8 * len(text))
         for x, y, text in re.findall(r'<text class="ink" x="([\d.]+)" y="([\d.]+)">([^<]+)<', svg)

@@ -11,7 +11,7 @@ from html import escape
 from rendergraph.compare.engine import Sweep
 from rendergraph.compare.report import html as blocks
 from rendergraph.compare.report.html import card, drawing, milliseconds, number, section, software_note, table
-from rendergraph.compare.report.scatter import Point, scatter_svg
+from rendergraph.compare.report.scatter import scatter_svg
 from rendergraph.compare.results import Comparison, Result, Search, machine, pareto
 from rendergraph.compare.timing import Times
 from rendergraph.diagrams import lifetimes_svg
@@ -225,21 +225,9 @@ def quality_svg(comparison: Comparison, front: Sequence[Result] = ()) -> str:
     """Return error against time as an SVG document, with a point for each result; the front is computed if missing."""
     results = comparison.results
     best = {result.name for result in (front or pareto(results))}
-    points = [
-        Point(
-            name=result.name,
-            label=" · ".join(result.settings.values()) or result.name,
-            ms=result.times.headline.median,
-            low=result.times.headline.p10,
-            high=result.times.headline.p90,
-            error=result.metrics.flip,
-            best=result.name in best,
-        )
-        for result in results
-    ]
     kind = "GPU" if results[0].times.gpu_ms else "frame"
     note = ", software rasteriser" if comparison.software else ""
-    return scatter_svg(points, f"{kind} time, ms{note}", f"FLIP against {comparison.reference.name}")
+    return scatter_svg(results, best, f"{kind} time, ms{note}", f"FLIP against {comparison.reference.name}")
 
 
 def _light(comparison: Comparison) -> tuple[str, str, str]:

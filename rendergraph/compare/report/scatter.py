@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
+
+from rendergraph.compare.results import Result
 
 WIDTH, HEIGHT = 760.0, 380.0
 LEFT, RIGHT, TOP, BOTTOM = 76.0, 36.0, 20.0, 52.0
@@ -17,23 +19,14 @@ _LINE = 13.0
 _STYLE = "\n" + Path(__file__).with_suffix(".css").read_text(encoding="ascii")
 
 
-@dataclass(frozen=True)
-class Point:
-    """A variant: its name and a short one, its time with the spread, its error; the `best` ones form the front."""
+def scatter_svg(results: Sequence[Result], best: Container[str], time: str, error: str) -> str:
+    """Return results as a stand-alone SVG document for light and dark pages, with titles of the axes; without NaN.
 
-    name: str
-    label: str
-    ms: float
-    low: float
-    high: float
-    error: float
-    best: bool
-
-
-def scatter_svg(points: Sequence[Point], time: str, error: str) -> str:
-    """Return points as a stand-alone SVG document for light and dark pages, with titles of the axes; without NaN."""
-    points = [p for p in points if math.isfinite(p.ms) and math.isfinite(p.error)]
-    right, up = _ceiling(max((p.high for p in points), default=1)), _ceiling(max((p.error for p in points), default=1))
+    The `best`, by name, form the front.
+    """
+    shown = [r for r in results if math.isfinite(_ms(r)) and math.isfinite(r.metrics.flip)]
+    right = _ceiling(max((r.times.headline.p90 for r in shown), default=1))
+    up = _ceiling(max((r.metrics.flip for r in shown), default=1))
 
     def x(ms: float) -> float:
         return LEFT + (WIDTH - LEFT - RIGHT) * min(ms, right) / right
@@ -56,30 +49,36 @@ def scatter_svg(points: Sequence[Point], time: str, error: str) -> str:
         (f'transform="translate(18 {middle:.0f}) rotate(-90)"', error),
     ):
         parts.append(f'<text class="fact" {where} text-anchor="middle">{escape(title)}</text>')
-    front = sorted((p for p in points if p.best), key=lambda p: p.ms)
+    front = sorted((r for r in shown if r.name in best), key=_ms)
+    corners = [(x(_ms(r)), y(r.metrics.flip)) for r in front]
     if len(front) > 1:
-        path = f"M{x(front[0].ms):.1f} {y(front[0].error):.1f}"
-        path += "".join(f"H{x(p.ms):.1f}V{y(p.error):.1f}" for p in front[1:])
+        path = "M{:.1f} {:.1f}".format(*corners[0]) + "".join(f"H{left:.1f}V{top:.1f}" for left, top in corners[1:])
         parts.append(f'<path class="front" d="{path}" stroke-width="1.5" stroke-dasharray="5 4"/>')
     # Labels avoid points, lines and other labels; those of the front are placed first.
-    taken = [_Spot(min(x(p.ms) - 7, x(p.low)), max(x(p.ms) + 7, x(p.high)), y(p.error)) for p in points]
-    for a, b in itertools.pairwise(front):
-        taken.append(_Spot(x(a.ms), x(b.ms), y(a.error)))
-        steps = math.ceil((y(b.error) - y(a.error)) / _LINE)
-        taken += [_Spot(x(b.ms) - 1, x(b.ms) + 1, y(a.error) + _LINE * step) for step in range(1, steps)]
-    for point in sorted(points, key=lambda p: (not p.best, p.ms)):
-        spread = f"{_plain(point.low)}–{_plain(point.high)}"
-        tooltip = f"{point.name}: {_plain(point.ms)} ms ({spread}), {_plain(point.error)}"
-        at, height = x(point.ms), y(point.error)
+    spread = [(r, x(_ms(r)), x(r.times.headline.p10), x(r.times.headline.p90), y(r.metrics.flip)) for r in shown]
+    taken = [_Spot(min(at - 7, low), max(at + 7, high), height) for _, at, low, high, height in spread]
+    for (left, top), (across, down) in itertools.pairwise(corners):
+        taken.append(_Spot(left, across, top))
+        steps = math.ceil((down - top) / _LINE)
+        taken += [_Spot(across - 1, across + 1, top + _LINE * step) for step in range(1, steps)]
+    for result, at, low, high, height in sorted(spread, key=lambda one: (one[0].name not in best, _ms(one[0]))):
+        ms = result.times.headline
+        tooltip = f"{result.name}: {_plain(ms.median)} ms ({_plain(ms.p10)}–{_plain(ms.p90)}), "
+        tooltip += _plain(result.metrics.flip)
         parts.append(
-            f'<g><title>{escape(tooltip)}</title><path d="M{x(point.low):.1f} {height:.1f}H{x(point.high):.1f}" '
+            f'<g><title>{escape(tooltip)}</title><path d="M{low:.1f} {height:.1f}H{high:.1f}" '
             f'stroke="#7d8590" stroke-opacity=".6"/>'
-            f'<circle class="{"best" if point.best else "dot"}" cx="{at:.1f}" cy="{height:.1f}" r="5"/>'
+            f'<circle class="{"best" if result.name in best else "dot"}" cx="{at:.1f}" cy="{height:.1f}" r="5"/>'
         )
-        if point.best or len(points) <= MOST_LABELS:
-            parts.append(_label(point.label, at, height, taken))
+        if result.name in best or len(shown) <= MOST_LABELS:
+            label = " · ".join(result.settings.values()) or result.name
+            parts.append(_label(label, at, height, taken))
         parts.append("</g>")
     return "\n".join([*parts, "</svg>"]) + "\n"
+
+
+def _ms(result: Result) -> float:
+    return result.times.headline.median
 
 
 @dataclass(frozen=True)
