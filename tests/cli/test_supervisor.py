@@ -146,11 +146,11 @@ def test_a_supervisor_that_is_killed_takes_its_worker_along(slow: Path) -> None:
 @pytest.mark.parametrize(("name", "deaf"), [("SIGTERM", True), ("SIGINT", False)])
 def test_a_process_that_hears_no_signal_is_killed_after_a_while(tmp_path: Path, name: str, deaf: bool) -> None:
     code = (
-        "import sys, time; from rendergraph.cli import main, supervisor; from rendergraph.session import stages\n"
+        "import sys, time; from rendergraph import cli; from rendergraph.session import stages\n"
         "def resolve(*a, **k):\n print('ready', flush=True)\n"
         f" {'max(range(10**13))' if deaf else 'time.sleep(30)'}\n"
-        f"supervisor.PATIENCE = {0.5 if deaf else 15}; stages.resolve = resolve; sys.argv[1:] = ['check', 'x']\n"
-        "sys.exit(main())"
+        f"cli.PATIENCE = {0.5 if deaf else 15}; stages.resolve = resolve; sys.argv[1:] = ['check', 'x']\n"
+        "sys.exit(cli.main())"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", code],
