@@ -198,7 +198,7 @@ def _at_its_lines(file: SweepFile | None) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise error if file is None else file.placed(error) from None
+        raise error if file is None else error.relocated(file.relocate) from None
 
 
 def _space(file: SweepFile | None, axes: tuple[Axis, ...], **sampling: Any) -> Space:

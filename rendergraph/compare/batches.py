@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from msgspec.structs import replace
 
-from rendergraph.compare.results import Pixels, passes
+from rendergraph.compare.results import passes
 from rendergraph.compare.space import unique_names
 from rendergraph.compare.timing import Times, times_repeated
 from rendergraph.declare import InOut, TextureInfo
 from rendergraph.errors import InputError
 from rendergraph.link import Endpoint, Graph, GraphNode
+from rendergraph.metrics import Pixels
 from rendergraph.session import stages
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 from rendergraph.catalog import Catalog
 from rendergraph.compare.batches import MOST_RUNS
@@ -30,13 +30,11 @@ from rendergraph.compare.store import RUN, Failure, SweepFolder, locked
 from rendergraph.diff import diff
 from rendergraph.errors import InputError, Problem, UsageError
 from rendergraph.farm.bundle import make_bundle
+from rendergraph.link import Graph
 from rendergraph.metrics import check_sizes
 from rendergraph.session.pipeline import Pipeline, as_pipeline, load
 from rendergraph.session.progress import report_progress
 from rendergraph.stamps import track_reads
-
-if TYPE_CHECKING:
-    from rendergraph.link import Graph
 
 
 @dataclass(frozen=True, eq=False)

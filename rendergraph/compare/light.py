@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -29,11 +29,10 @@ from rendergraph.textures import Any as AnyTexel
 if TYPE_CHECKING:
     import networkx as nx
 
+    from rendergraph.metrics import Pixels
     from rendergraph.session.gpu import Gpu
     from rendergraph.session.values import Planned
     from rendergraph.steps import Frame, Steps
-
-    Pixels = npt.NDArray[Any]
 
 LIGHT = "light before display"
 """Name of the output that is added for the light; no output of a file can have it."""

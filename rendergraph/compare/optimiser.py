@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
+from typing import Any, Literal, TypeAlias, Unpack
 
 from rendergraph.compare.engine import Sweep, sweep
 from rendergraph.compare.prepare import Prepared, SweepKeywords, SweepOptions, prepare
@@ -20,11 +19,9 @@ from rendergraph.compare.results import OBJECTIVES, Result, Search, objective_va
 from rendergraph.compare.space import Axes, Axis, Space, typed
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.installed import require
+from rendergraph.session import Pipeline
 from rendergraph.session.outputs import figures
 from rendergraph.session.progress import report_progress
-
-if TYPE_CHECKING:
-    from rendergraph.session import Pipeline
 
 BATCH_SIZE = 8
 """Runs that the optimiser suggests at a time; they are rendered together."""
@@ -64,7 +61,9 @@ class _Optimiser:
         self._groups = space.groups  # zipped axes are one dimension
         self._distributions = {group[0].path: _distribution(group[0]) for group in self._groups}
         self._results: dict[Settings, Result | None] = {}
-        with _silent():
+        optuna.logging.set_verbosity(optuna.logging.WARNING)  # it would report every trial
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
             sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, constant_liar=True)
             directions: list[Literal["minimize"]] = ["minimize"] * len(objectives)
             self._study = optuna.create_study(sampler=sampler, directions=directions)
@@ -101,11 +100,10 @@ class _Optimiser:
         from optuna.trial import TrialState  # an extra
 
         values = objective_values(result, self.objectives)
-        with _silent():
-            if values is None:
-                self._study.tell(trial, state=TrialState.FAIL)
-            else:
-                self._study.tell(trial, values)
+        if values is None:
+            self._study.tell(trial, state=TrialState.FAIL)
+        else:
+            self._study.tell(trial, values)
 
 
 def search(
@@ -191,14 +189,3 @@ def _ends(space: Space) -> Iterator[dict[str, str]]:
 
 def _key(settings: Mapping[str, str]) -> Settings:
     return tuple(sorted(settings.items()))
-
-
-@contextmanager
-def _silent() -> Iterator[None]:
-    """Suppress Optuna's report of every trial, and its warnings about experimental features."""
-    import optuna  # an extra
-
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
-        yield

@@ -18,11 +18,11 @@ from msgspec import Struct, structs
 from rendergraph.compare.batches import MOST_BYTES
 from rendergraph.compare.fingerprint import file_digest, run_key, worker_digest
 from rendergraph.compare.light import light_of
-from rendergraph.compare.results import Pixels, Reference
+from rendergraph.compare.results import Reference, TwinError
 from rendergraph.compare.space import Axes, Space, pipelines, run_name, unique_names
 from rendergraph.errors import InputError, Option, Place, Problem, UsageError
 from rendergraph.farm.bundle import relocate_selection
-from rendergraph.metrics import Encoding, check_sizes
+from rendergraph.metrics import Encoding, Pixels, check_sizes
 from rendergraph.pipelines.references import reference_selection
 from rendergraph.session import stages
 from rendergraph.session.picture_metadata import frame_metadata, is_picture, pipeline_metadata
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from rendergraph.resolve import PipelineSpec
     from rendergraph.session.gpu import Gpu
     from rendergraph.session.progress import Progress
-    from rendergraph.session.selection import Selection
     from rendergraph.session.values import Planned
 
 REFERENCE_NOISE, REFERENCE_SECONDS = 0.1, 120.0
@@ -228,14 +227,11 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Twin:
-    """A run with the twin of one of its nodes in that node's place; the error of its light is NaN until it is known."""
+    """A run with the twin of one of its nodes in that node's place, and the error of its light once it is known."""
 
     number: int
-    node: str
-    type: str
-    twin: str
     run: Run
-    relative_mse: float = math.nan
+    error: TwinError
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,8 +240,8 @@ class Prepared:
 
     Attributes:
         output, encoding: what is compared.
-        picture, other, truth: the reference, if it is a file, a pipeline of its own, or a pipeline that converges to
-            ground truth.
+        reference: a picture file or a pipeline of its own; None if it is the first run.
+        is_truth: the reference is a pipeline that converges to ground truth.
         twins: runs that show how much of an error comes from which technique.
         notes: changes that made the pipelines comparable.
         space, study: the axes of a sweep, and what identifies its folder.
@@ -254,10 +250,9 @@ class Prepared:
     runs: tuple[Run, ...]
     output: str
     encoding: Encoding
-    picture: Reference | None
-    other: Run | None
+    reference: Reference | Run | None
+    is_truth: bool
     notes: tuple[str, ...]
-    truth: Run | None = None
     twins: tuple[Twin, ...] = ()
     space: Space = field(default_factory=lambda: Space(()))
     study: Mapping[str, Any] = field(default_factory=dict)
@@ -265,12 +260,12 @@ class Prepared:
     @property
     def base(self) -> Run:
         """What the runs are compared with in structure: the reference pipeline, or the first run."""
-        return self.other or self.runs[0]
+        return self.runs[0] if self.is_truth else next(iter(self.references), self.runs[0])
 
     @property
     def references(self) -> list[Run]:
         """The reference, if it is a pipeline of its own."""
-        return [run for run in (self.other, self.truth) if run is not None]
+        return [self.reference] if isinstance(self.reference, Run) else []
 
     @property
     def modules(self) -> set[str]:
@@ -309,11 +304,11 @@ def prepare(
         combinations = [combinations[number] for number in options.only]
         names = [names[number] for number in options.only]
     prepared = prepare_variants(pipelines(base, combinations), reference, options, names)
-    picture = prepared.picture
-    if prepared.truth is not None:
-        key = f"{run_key(prepared.truth.planned, options.frame, '')} {options.limits}"
+    if isinstance(prepared.reference, Reference):
+        key = file_digest(Path(prepared.reference.name))
     else:
-        key = file_digest(Path(picture.name)) if picture else run_key(prepared.base.planned, options.frame, "")
+        key = run_key((prepared.reference or prepared.runs[0]).planned, options.frame, "")
+    key += f" {options.limits}" if prepared.is_truth else ""
     runs = tuple(
         replace(run, settings=setting, folder=out / run.name, reference_key=key)
         for run, setting in zip(prepared.runs, combinations, strict=True)
@@ -380,16 +375,19 @@ def prepare_variants(
         Run(number, name, each, output, options.frame, light=light_of(each.linked.graph) if is_truth else None)
         for number, (name, each) in enumerate(zip(names, planned[:count], strict=True))
     ]
-    other = Run(-1, graphs[-1].name, planned[-1], output, options.frame) if others else None
+    against: Reference | Run | None = None
+    if picture is not None:
+        against = Reference(str(reference), "file", picture[0], encoding, output)
+    elif others:
+        against = Run(-1, graphs[-1].name, planned[-1], output, options.frame)
     pairs = zip(runs, matched[:count], strict=True) if is_truth and twins else ()
     found = [twin for run, pipeline in pairs for twin in _twins(run, pipeline, notes)]
     return Prepared(
         runs=tuple(runs),
         output=output,
         encoding=encoding,
-        picture=Reference(str(reference), "file", picture[0], encoding, output) if picture else None,
-        other=None if is_truth else other,
-        truth=other if is_truth else None,
+        reference=against,
+        is_truth=is_truth,
         twins=tuple(found),
         notes=tuple(notes),
     )
@@ -453,7 +451,7 @@ def _twins(run: Run, pipeline: Pipeline, notes: list[str]) -> Iterator[Twin]:
             notes.append(f"'{node.id}' of '{run.name}' cannot be replaced by its twin '{twin}': {reason}")
             continue
         own = Run(-1, f"{run.name} with {twin}", changed, run.output, run.frame, light=light)
-        yield Twin(run.number, node.id, node.type.name, twin, own)
+        yield Twin(run.number, own, TwinError(node.id, node.type.name, twin))
 
 
 def _with_twin(pipeline: Pipeline, node: str, twin: NodeType) -> Pipeline:

@@ -11,7 +11,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 from msgspec import to_builtins
 
 from rendergraph import metrics
@@ -22,7 +21,7 @@ from rendergraph.declare.extensions import Metric
 from rendergraph.diff import GraphDiff, diff_json
 from rendergraph.errors import Place, Problem, suggestion
 from rendergraph.installed import require, versions
-from rendergraph.metrics import Encoding, Metrics
+from rendergraph.metrics import Encoding, Metrics, Pixels
 from rendergraph.system import processor
 
 if TYPE_CHECKING:
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
     from rendergraph.link import Graph
     from rendergraph.session.values import Planned
 
-Pixels = npt.NDArray[Any]
 K = TypeVar("K", bound=Hashable)
 
 
@@ -78,8 +76,8 @@ class TwinError:
     node: str
     type: str
     twin: str
-    relative_mse: float | None
-    reduction: float | None
+    relative_mse: float | None = None
+    reduction: float | None = None
 
     def as_json(self) -> dict[str, Any]:
         return {name: getattr(self, name) for name in ("type", "twin", "relative_mse", "reduction")}

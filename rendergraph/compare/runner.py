@@ -17,7 +17,6 @@ from rendergraph.compare.results import (
     Comparison,
     Reference,
     Result,
-    TwinError,
     objective_values,
     pareto_front,
     passes,
@@ -39,7 +38,7 @@ class Runner:
     def __init__(self, prepared: Prepared, options: SweepOptions) -> None:
         self.prepared, self.options = prepared, options
         self.results: dict[int, Result] = {}
-        self.reference: Reference | None = prepared.picture
+        self.reference = prepared.reference if isinstance(prepared.reference, Reference) else None
         self.device: Mapping[str, object] = {}
         self.warnings: list[Problem] = []
         self.twins: dict[int, list[Twin]] = {}
@@ -53,11 +52,11 @@ class Runner:
 
     def execute(self, farm: Executor, progress: Callable[[int, int], None]) -> None:
         self._waiting = self._groups(self.missing, farm.workers)
-        if self.prepared.truth is not None:
-            self.reference = self._draw_truth(farm, self.prepared.truth)
+        if self.prepared.is_truth:
+            self.reference = self._draw_truth(farm, *self.prepared.references)
         if self.reference is not None:
             self._distribute(farm, self.reference)
-        elif self.prepared.other is not None or 0 in self.results:
+        elif self.prepared.references or 0 in self.results:
             base = self.prepared.base.for_task()
             farm.submit(tasks.ReferenceTask(base.name, base, self.prepared.encoding))
         elif self._waiting:
@@ -123,10 +122,10 @@ class Runner:
     def _with_errors(self, number: int) -> Result:
         """Return a result with the errors that remain with each twin, the smallest first."""
         result, errors = self.results[number], []
-        for one in self.twins.get(number, ()):
-            left = one.relative_mse if math.isfinite(one.relative_mse) else None
+        for error in (twin.error for twin in self.twins.get(number, ())):
+            left = error.relative_mse
             reduction = 1 - left / result.relative_mse if left is not None and result.relative_mse else None
-            errors.append(TwinError(one.node, one.type, one.twin, left, reduction))
+            errors.append(replace(error, reduction=reduction))
         errors.sort(key=lambda error: math.inf if error.relative_mse is None else error.relative_mse)
         return replace(result, error_by=tuple(errors))
 
@@ -388,7 +387,7 @@ def list_sweep(prepared: Prepared, out: Path | None = None, options: SweepOption
     kept = frozenset[int]()
     if out is not None:
         store.check_folder(out, prepared.study, resume=options.resume)
-        lines, _ = store.ResultsLog(out / store.RESULTS).by_key()
+        lines = store.SweepFolder.read(out).lines
         kept = frozenset(number for number, run in enumerate(prepared.runs) if is_complete(run, lines, options))
     waiting = [number for number in range(len(prepared.runs)) if number not in kept]
     groups = batches([run.planned for run in prepared.runs], waiting, options.most_bytes)

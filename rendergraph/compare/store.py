@@ -142,46 +142,17 @@ class Failure:
         return {"name": self.name, "settings": typed_settings(self.settings), "error": self.text}
 
 
-@dataclass(frozen=True)
-class ResultsLog:
-    """An append-only file of JSON lines; each line has the SHA-256 of its other fields, to detect incomplete ones."""
-
-    path: Path
-
-    def read(self) -> tuple[list[dict[str, Any]], int]:
-        """Return the complete records in the order they were written, and the number of incomplete lines."""
-        try:
-            lines = self.path.read_bytes().split(b"\n")
-        except FileNotFoundError:
-            return [], 0
-        except OSError as error:
-            raise self._failed(error) from error
-        records = [_verified(line) for line in lines if line.strip()]
-        return [record for record in records if record is not None], sum(record is None for record in records)
-
-    def by_key(self) -> tuple[dict[str, dict[str, Any]], int]:
-        records, incomplete = self.read()
-        return {record["key"]: record for record in records if "key" in record}, incomplete
-
-    def append(self, record: Mapping[str, Any]) -> None:
-        """Add a record; it is on the disk when this returns."""
-        line = json.dumps({**record, CHECKSUM: checksum(record)}, ensure_ascii=False) + "\n"
-        try:
-            new = not self.path.exists()
-            with self.path.open("ab+") as file:
-                size = file.tell()
-                file.seek(max(0, size - 1))
-                torn = size > 0 and file.read(1) != b"\n"
-                file.write((b"\n" if torn else b"") + line.encode(errors="backslashreplace"))
-                file.flush()
-                os.fsync(file.fileno())
-            if new:
-                flush(self.path.parent)
-        except OSError as error:
-            raise self._failed(error) from error
-
-    def _failed(self, error: OSError) -> RenderError:
-        return write_error(self.path, "the results cannot be written", error)
+def read_results(out: Path) -> tuple[list[dict[str, Any]], int]:
+    """Return the complete records of a folder in the order they were written, and the number of incomplete lines."""
+    path = out / RESULTS
+    try:
+        lines = path.read_bytes().split(b"\n")
+    except FileNotFoundError:
+        return [], 0
+    except OSError as error:
+        raise write_error(path, "the results cannot be written", error) from error
+    records = [_verified(line) for line in lines if line.strip()]
+    return [record for record in records if record is not None], records.count(None)
 
 
 def checksum(record: Mapping[str, Any]) -> str:
@@ -232,7 +203,12 @@ class SweepFolder:
         check_folder(path, study, resume=resume)
         for part in (*path.glob(".*.part"), *path.glob("*/.*.part")):
             part.unlink(missing_ok=True)
-        return cls(path, *ResultsLog(path / RESULTS).by_key())
+        return cls.read(path)
+
+    @classmethod
+    def read(cls, path: Path) -> SweepFolder:
+        records, incomplete = read_results(path)
+        return cls(path, {record["key"]: record for record in records if "key" in record}, incomplete)
 
     def begin(self, study: Mapping[str, Any]) -> None:
         """Write `study.json`; to be called before the first picture is written."""
@@ -266,7 +242,22 @@ class SweepFolder:
                 raise write_error(run.picture, "the picture cannot be removed", error) from error
 
     def append(self, record: Mapping[str, Any]) -> None:
-        ResultsLog(self.path / RESULTS).append(record)
+        """Add a line to the results, with the SHA-256 of its other fields; it is on the disk when this returns."""
+        path = self.path / RESULTS
+        line = json.dumps({**record, CHECKSUM: checksum(record)}, ensure_ascii=False) + "\n"
+        try:
+            new = not path.exists()
+            with path.open("ab+") as file:
+                size = file.tell()
+                file.seek(max(0, size - 1))
+                torn = size > 0 and file.read(1) != b"\n"
+                file.write((b"\n" if torn else b"") + line.encode(errors="backslashreplace"))
+                file.flush()
+                os.fsync(file.fileno())
+            if new:
+                flush(self.path)
+        except OSError as error:
+            raise write_error(path, "the results cannot be written", error) from error
 
     def fail(self, run: Run, problems: Sequence[Problem]) -> Failure:
         """Write the line of a run that cannot be rendered, unless the last one has the same reason."""

@@ -98,10 +98,8 @@ class SweepFile(Struct, frozen=True, eq=False):
     sets: tuple[str, ...]
     places: Mapping[str, Value]
 
-    def placed(self, error: InputError) -> InputError:
-        return error.relocated(self._placed)
-
-    def _placed(self, problem: Problem) -> Problem:
+    def relocate(self, problem: Problem) -> Problem:
+        """Return a mistake in a path at its line in the file."""
         option = problem.place.option("-x", "--set", "--zip") if problem.place else None
         value = self.places.get(option.path) if option else None
         return value.relocate(problem, key=option.name != "--zip") if option and value else problem

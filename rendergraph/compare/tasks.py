@@ -14,7 +14,7 @@ import numpy as np
 from rendergraph.compare.batches import Batch, fitting_batches, measure_batch, node_types, render_batch
 from rendergraph.compare.light import LIGHT, with_light
 from rendergraph.compare.prepare import Run
-from rendergraph.compare.results import Difference, Pixels, Reference, light_errors, machine, measure_against, passes
+from rendergraph.compare.results import Difference, Reference, light_errors, machine, measure_against, passes
 from rendergraph.compare.timing import Times, times_of
 from rendergraph.declare import InOut, Output
 from rendergraph.diff import GraphDiff, diff
@@ -22,16 +22,14 @@ from rendergraph.errors import InputError, Problem, RenderError, RendergraphErro
 from rendergraph.farm import Handle, Task, Worker
 from rendergraph.farm.bundle import map_remote_paths
 from rendergraph.farm.tasks import is_retryable
-from rendergraph.link import Endpoint
-from rendergraph.metrics import Encoding
-from rendergraph.session import RenderOptions, stages
+from rendergraph.link import Endpoint, Graph
+from rendergraph.metrics import Encoding, Pixels
+from rendergraph.session import Frame, RenderOptions, stages
 from rendergraph.session.frame import figures_of, not_finite
 
 if TYPE_CHECKING:
     from rendergraph.allocate import ResourcePlan
     from rendergraph.execute import FrameTimes
-    from rendergraph.link import Graph
-    from rendergraph.session import Frame
     from rendergraph.session.gpu import Gpu
     from rendergraph.session.values import Planned
 

@@ -24,14 +24,12 @@ from rendergraph.compare.results import Reference
 from rendergraph.compare.tasks import ReferenceResult, origin_of
 from rendergraph.farm import Handle, Task, Worker
 from rendergraph.images.cache import DiskCache
-from rendergraph.metrics import Encoding, colors, measure, relative_mse, relative_noise
+from rendergraph.metrics import Encoding, Pixels, colors, measure, relative_mse, relative_noise
 from rendergraph.session import RenderOptions, stages
 
 if TYPE_CHECKING:
     from rendergraph.session.gpu import Gpu
     from rendergraph.session.values import Planned
-
-    Pixels = npt.NDArray[Any]
 
 TWIN_FRAMES = 16
 """Frames to average for a twin's light: a single frame of a traced twin is noisy."""
@@ -131,7 +129,9 @@ class TwinTask(Task):
     def run(self, worker: Worker) -> Iterator[Twin]:
         reference, run = worker.value(self.needs[0]), self.twin.run
         light = _light(worker.gpu, run.plan(worker), run, frames=TWIN_FRAMES)
-        yield replace(self.twin, relative_mse=relative_mse(light, reference.light))
+        error = relative_mse(light, reference.light)
+        known = error if math.isfinite(error) else None
+        yield replace(self.twin, error=replace(self.twin.error, relative_mse=known))
 
 
 def representatives(runs: Sequence[Run]) -> tuple[Run, ...]:

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msgspec.structs import replace
 
+from rendergraph.catalog import Catalog, NodeType
 from rendergraph.errors import InputError, Problem, UsageError, node_named, suggestion
+from rendergraph.expand import Expansion
 from rendergraph.reference.examples import example_file
 from rendergraph.resources import shipped_pipelines
-from rendergraph.session import stages
-
-if TYPE_CHECKING:
-    from rendergraph.catalog import Catalog, NodeType
-    from rendergraph.expand import Expansion
-    from rendergraph.session import Selection
-    from rendergraph.session.values import Linked
-    from rendergraph.steps import Step
+from rendergraph.session import Selection, stages
+from rendergraph.session.values import Linked
+from rendergraph.steps import Step
 
 _KINDS_WITH_PROGRAM = ("fullscreen", "geometry", "draw", "compute")
 

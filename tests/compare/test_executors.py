@@ -21,7 +21,7 @@ import pytest
 
 import rendergraph as rg
 from rendergraph.compare.engine import Sweep, compare, sweep
-from rendergraph.compare.store import RESULTS, ResultsLog
+from rendergraph.compare.store import read_results
 from rendergraph.errors import InputError, RenderError, UsageError
 from rendergraph.farm import dask_cluster
 from rendergraph.farm.executors import Processes
@@ -86,7 +86,7 @@ def base(tmp_path: Path) -> rg.Pipeline:
 def rows(folder: Path) -> dict[str, dict[str, Any]]:
     """Each run's row, without what is measured in seconds and where."""
     measured = ("frame_ms", "gpu_ms", "cpu_ms", "passes", "repeats", "machine", "device", "sha256")
-    records, torn = ResultsLog(folder / RESULTS).read()
+    records, torn = read_results(folder)
     assert torn == 0
     found = {record["name"]: {key: value for key, value in record.items() if key not in measured} for record in records}
     assert len(found) == len(records)
@@ -220,13 +220,13 @@ def test_a_full_disk_keeps_what_is_there(base: rg.Pipeline, gl: rg.Session, tmp_
     )
     assert ended.returncode == 1, ended.stderr
     assert "RG507 the results cannot be written" in ended.stderr
-    records, _ = ResultsLog(tmp_path / "out" / RESULTS).read()
+    records, _ = read_results(tmp_path / "out")
     assert 1 <= len(records) < 12
     again = sweep(
         rg.load(tmp_path / "p.yaml"), ["make.wave=1:12:1"], tmp_path / "out", frames=1, resume=True, session=gl
     )
     assert (again.resumed >= len(records), len(again.comparison.results)) == (True, 12)
-    assert len({record["key"] for record in ResultsLog(tmp_path / "out" / RESULTS).read()[0]}) == 12
+    assert len({record["key"] for record in read_results(tmp_path / "out")[0]}) == 12
 
 
 def test_pipelines_are_compared_elsewhere_as_here(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from rendergraph.compare.engine import sweep
 from rendergraph.compare.export.openjd import measure, numbers_text, parse_numbers, render_frames, template
 from rendergraph.compare.prepare import SweepOptions, prepare
 from rendergraph.compare.runner import list_sweep
-from rendergraph.compare.store import ResultsLog
+from rendergraph.compare.store import read_results
 from rendergraph.errors import InputError
 from rendergraph.images import read
 
@@ -76,10 +76,7 @@ def test_parts_are_the_whole(gl: rg.Session, tmp_path: Path, against: str | None
     for one, other in zip(whole.comparison.results, gathered.comparison.results, strict=True):
         assert (one.name, one.metrics, one.radiance_rmse) == (other.name, other.metrics, other.radiance_rmse)
         np.testing.assert_array_equal(read(tmp_path / "whole" / one.name / "radiance.exr"), other.pixels)
-    keys = [
-        {r["name"]: r["key"] for r in ResultsLog(tmp_path / folder / "results.jsonl").read()[0]}
-        for folder in ("whole", "out")
-    ]
+    keys = [{r["name"]: r["key"] for r in read_results(tmp_path / folder)[0]} for folder in ("whole", "out")]
     assert keys[0] == keys[1]
     assert measure(drawn, AXES, out, reference, SweepOptions(only=[0, 2], frames=1, session=gl)) is None  # it is there
 

@@ -16,7 +16,7 @@ from rendergraph.compare.optimiser import BATCH_SIZE, check_search, search
 from rendergraph.compare.report import sweep_page
 from rendergraph.compare.results import pareto_front
 from rendergraph.compare.space import Space
-from rendergraph.compare.store import ResultsLog
+from rendergraph.compare.store import read_results
 from rendergraph.errors import InputError, UsageError
 
 pytest.importorskip("optuna")
@@ -73,7 +73,7 @@ def test_a_search_comes_nearer_than_chance(
         assert result.metrics.rmse == pytest.approx(0.25 * far, rel=1e-4, abs=1e-6)
     page = sweep_page(found, "rendergraph sweep")
     assert "Best runs of the search" in page
-    assert len(ResultsLog(out / "results.jsonl").read()[0]) == len(found.comparison.results)
+    assert len(read_results(out)[0]) == len(found.comparison.results)
     assert found.as_json()["search"]["front"] == list(found.search.front)
 
 

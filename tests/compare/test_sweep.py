@@ -24,7 +24,7 @@ from rendergraph.compare.report import sweep_page
 from rendergraph.compare.results import pareto
 from rendergraph.compare.runner import list_sweep
 from rendergraph.compare.space import Axis, Space, parse_axis, pipelines, typed
-from rendergraph.compare.store import RESULTS, ResultsLog, checksum, kept_runs, line_schema
+from rendergraph.compare.store import RESULTS, SweepFolder, checksum, kept_runs, line_schema, read_results
 from rendergraph.errors import InputError, UsageError
 from rendergraph.images import read, write
 
@@ -58,7 +58,7 @@ def test_a_sweep_draws_distinct_passes_and_the_pictures_of_single_runs(
         assert told["flip"] == result.metrics.flip
         assert "nodes:" in told["resolved"]
     assert found.comparison.results[0].metrics.flip == 0
-    records, torn = ResultsLog(tmp_path / "out" / "results.jsonl").read()
+    records, torn = read_results(tmp_path / "out")
     assert ([record["name"] for record in records], torn) == ([r.name for r in found.comparison.results], 0)
     front = pareto(found.comparison.results)
     assert found.comparison.results[0].name in {result.name for result in front}
@@ -262,7 +262,7 @@ def test_the_best_pictures_are_kept_and_no_others(gl: rg.Session, tmp_path: Path
 
 
 def lines(folder: Path) -> list[dict[str, Any]]:
-    return ResultsLog(folder / RESULTS).read()[0]
+    return read_results(folder)[0]
 
 
 def test_a_value_that_fails_is_a_row_and_the_others_go_on(gl: rg.Session, tmp_path: Path) -> None:
@@ -423,18 +423,18 @@ def test_a_reference_picture_counts_by_its_content(base: rg.Pipeline, gl: rg.Ses
 
 
 def test_a_torn_line_is_left_out_and_the_file_goes_on(tmp_path: Path) -> None:
-    ledger = ResultsLog(tmp_path / "results.jsonl")
-    ledger.append({"key": "a", "ssim": 0.5})
-    ledger.append({"key": "b", "name": "ä"})
-    whole = ledger.path.read_bytes()
-    ledger.path.write_bytes(whole[:-7])
-    assert ledger.read() == ([{"key": "a", "ssim": 0.5, "sha256": checksum({"key": "a", "ssim": 0.5})}], 1)
-    ledger.append({"key": "c"})
-    records, torn = ledger.read()
+    folder, path = SweepFolder.read(tmp_path), tmp_path / RESULTS
+    folder.append({"key": "a", "ssim": 0.5})
+    folder.append({"key": "b", "name": "ä"})
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-7])
+    assert read_results(tmp_path) == ([{"key": "a", "ssim": 0.5, "sha256": checksum({"key": "a", "ssim": 0.5})}], 1)
+    folder.append({"key": "c"})
+    records, torn = read_results(tmp_path)
     assert ([record["key"] for record in records], torn) == (["a", "c"], 1)
-    ledger.path.write_bytes(ledger.path.read_bytes().replace(b"0.5", b"0.6"))
-    assert ledger.read()[1] == 2
-    assert ledger.path.read_bytes().startswith(whole[:10])
+    path.write_bytes(path.read_bytes().replace(b"0.5", b"0.6"))
+    assert read_results(tmp_path)[1] == 2
+    assert path.read_bytes().startswith(whole[:10])
 
 
 @pytest.mark.slow

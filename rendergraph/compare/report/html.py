@@ -161,7 +161,7 @@ def first_differences(comparison: Comparison) -> str:
     parts = []
     base = comparison.base[0] if comparison.base else ""
     for result in comparison.results:
-        if result.difference is None or result.name == base:
+        if result.difference is None or result.plan is None or result.name == base:
             continue
         first = result.first
         if first is None:

@@ -33,21 +33,18 @@ def comparison_page(comparison: Comparison, command: str, *, title: str = "", no
     """Return the report of `compare`; `command` repeats it, `note` is a text whose empty lines separate paragraphs."""
     names = [result.name for result in comparison.results]
     title = title or (f"{names[0]} against {', '.join(names[1:])}" if names[1:] else names[0])
-    summary = _summary(comparison, front=())
-    pictures = section("pictures", "Pictures", blocks.viewer(comparison), blocks.sheet(comparison, MOST_COLUMNS))
-    if all(result.memory for result in comparison.results):
-        sections = [
-            section("summary", "Summary", summary, software_note(comparison.software)),
-            pictures,
-            section("light", "Light against the truth", *_light(comparison)),
-            section("first", "First difference", blocks.first_differences(comparison)),
-            section("times", "Times", *_times(comparison, comparison.results[:MOST_COLUMNS], ())),
-            section("structure", "Structure", _structure(comparison)),
-            section("memory", "Memory", _memory(comparison.results)),
-        ]
-    else:
-        structure = section("structure", "Pipelines in the pictures' metadata", _structure(comparison))
-        sections = [section("summary", "Summary", summary), pictures, structure]
+    measured = all(result.memory for result in comparison.results)
+    times = _times(comparison, comparison.results[:MOST_COLUMNS], ()) if measured else ()
+    structure = "Structure" if measured else "Pipelines in the pictures' metadata"
+    sections = [
+        section("summary", "Summary", _summary(comparison, front=()), software_note(comparison.software)),
+        section("pictures", "Pictures", blocks.viewer(comparison), blocks.sheet(comparison, MOST_COLUMNS)),
+        section("light", "Light against the truth", *_light(comparison)),
+        section("first", "First difference", blocks.first_differences(comparison)),
+        section("times", "Times", *times),
+        section("structure", structure, _structure(comparison)),
+        section("memory", "Memory", _memory(comparison.results)),
+    ]
     return _page(title, note, comparison, sections, command)
 
 
