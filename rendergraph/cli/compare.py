@@ -297,9 +297,8 @@ def _write(comparison: Comparison, output: Path, crops: Sequence[Any], *, title:
     """Write a comparison as a page, a figure or a table, by the extension."""
     suffix = output.suffix.lower()
     if suffix in _FIGURES:
-        from rendergraph.compare.report.figure import save_figure
-
-        save_figure(comparison, output, crops, note or title)
+        drawing = comparison.figure(crops, caption=note or title, errors=not crops)
+        drawing.savefig(output, dpi=300)
         return
     if suffix == ".tex":
         from rendergraph.compare.report.figure import latex_table

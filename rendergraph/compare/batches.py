@@ -148,7 +148,10 @@ def merge(graphs: Sequence[Graph]) -> tuple[Graph, tuple[dict[str, str], ...]]:
     Output `image` of the second graph is called `1/image` there.
     """
     classes = _equivalence_classes(graphs)
-    ids = _class_ids(classes)
+    first: dict[int, str] = {}  # each class is called as its first member, with a number behind if that is taken
+    for (_, name), number in classes.items():
+        first.setdefault(number, name)
+    ids = dict(zip(first, unique_names(list(first.values())), strict=True))
     names = tuple(
         {node.id: ids[classes[number, node.id]] for node in graph.nodes} for number, graph in enumerate(graphs)
     )
@@ -162,9 +165,9 @@ def merge(graphs: Sequence[Graph]) -> tuple[Graph, tuple[dict[str, str], ...]]:
         for end, info in graph.textures.items():
             textures.setdefault(_renamed(end, own), replace(info, view=_renamed_view(info.view, own)))
         outputs |= {f"{number}/{name}": _renamed(end, own) for name, end in graph.outputs.items()}
-    first = graphs[0]
-    reads = next((graph for graph in graphs if graph.facts.scene_data is not None), first)
-    return Graph(first.name, nodes, outputs, reads.facts, textures, knows_objects=first.knows_objects), names
+    base = graphs[0]
+    reads = next((graph for graph in graphs if graph.facts.scene_data is not None), base)
+    return Graph(base.name, nodes, outputs, reads.facts, textures, knows_objects=base.knows_objects), names
 
 
 def _renamed(end: Endpoint, names: Mapping[str, str]) -> Endpoint:
@@ -214,11 +217,3 @@ def _followers(graphs: Sequence[Graph]) -> dict[Key, list[tuple[str, Key, str]]]
                     for end in ends:
                         table.setdefault((number, end.node), []).append((end.port, (number, node.id), port))
     return {key: sorted(followers) for key, followers in table.items()}
-
-
-def _class_ids(classes: Mapping[Key, int]) -> dict[int, str]:
-    """Return an id for each class: that of its first member, with a number behind if it is taken."""
-    first: dict[int, str] = {}
-    for (_, name), number in classes.items():
-        first.setdefault(number, name)
-    return dict(zip(first, unique_names(list(first.values())), strict=True))

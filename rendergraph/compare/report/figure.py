@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rendergraph.compare.report.html import eight_bit
@@ -99,8 +98,3 @@ def latex_table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
 def _latex(text: str) -> str:
     text = re.sub(r"[\\~^∞&%$#_{}]", lambda letter: _ESCAPED[letter[0]], text)
     return text.replace("–", "--")
-
-
-def save_figure(comparison: Comparison, path: Path, crops: Sequence[Crop], caption: str) -> None:
-    """Write a figure; the extension chooses the format."""
-    figure(comparison, crops, caption=caption, errors=not crops).savefig(path, dpi=300)
