@@ -13,15 +13,8 @@ from rendergraph.declare import Node
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.gl.programs import Program, Uniform, member_offsets, outputs_of
 from rendergraph.glsl.globals import globals_of
-from rendergraph.program.checks import (
-    Texts,
-    named_reads,
-    unbound_block,
-    unbound_sampler,
-    unfit_outputs,
-    unfit_sampler,
-    unset_uniform,
-)
+from rendergraph.program import checks
+from rendergraph.program.checks import Texts, named_reads
 from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import BufferDesc
 
@@ -69,9 +62,9 @@ class ProgramChecks(Struct, eq=False, dict=True):
         for name, uniform in self.program.uniforms.items():
             if uniform.is_opaque:
                 if name not in images and name not in self.sampled:
-                    yield self._problem("RG430", unbound_sampler(step, name, self.sampled, self.cls), name)
+                    yield self._problem("RG430", checks.unbound_sampler(step, name, self.sampled, self.cls), name)
             elif name not in uniforms:
-                yield self._problem("RG434", unset_uniform(step, name), name)
+                yield self._problem("RG434", checks.unset_uniform(step, name), name)
             elif (mismatch := uniform_mismatch(uniform, uniforms[name])) is not None:
                 yield self._problem("RG436", f"{files} {mismatch}", name)
 
@@ -80,7 +73,7 @@ class ProgramChecks(Struct, eq=False, dict=True):
         for name, read in named_reads(self.step):
             uniform = self.program.uniforms.get(name)
             if read.use == "sample" and uniform is not None:
-                problem = unfit_sampler(self.step, uniform.glsl, read, self.resources)
+                problem = checks.unfit_sampler(self.step, uniform.glsl, read, self.resources)
                 if problem is not None:
                     yield _placed(problem, name, self.texts)
 
@@ -88,7 +81,7 @@ class ProgramChecks(Struct, eq=False, dict=True):
         """Find unbound buffers, writes to which would be lost or overwrite another node's buffer."""
         for name in self.program.block_names:
             if name not in self.blocks:
-                yield self._problem("RG430", unbound_block(self.step, name), name)
+                yield self._problem("RG430", checks.unbound_block(self.step, name), name)
 
     def _elements(self) -> Iterator[Problem]:
         """Find blocks whose element layout differs from the declaration, and so from what NumPy wrote."""
@@ -109,7 +102,7 @@ class ProgramChecks(Struct, eq=False, dict=True):
     def _outputs(self) -> Iterator[Problem]:
         """Check that a program writes every target, and nothing else, with the numeric type of the target."""
         step, written = self.step, outputs_of(self.program)
-        for problem in unfit_outputs(step, written, self.cls, self.resources):
+        for problem in checks.unfit_outputs(step, written, self.cls, self.resources):
             yield _placed(problem, problem.subject, self.texts)
         targets = [write.name for write in step.writes if write.use == "color"]
         shader = dict(step.shaders).get("fragment", "the step")

@@ -19,10 +19,9 @@ from rendergraph import activity
 from rendergraph.allocate import ResourcePlan
 from rendergraph.compile.bindings import ViewBuffers
 from rendergraph.compile.checks import uniform_mismatch
-from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES, GpuScene
+from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES, TEXELS, GpuScene
 from rendergraph.compile.memory import Call, Memory
 from rendergraph.compile.reuse import Reuse, Source
-from rendergraph.compile.scene_buffers import TEXELS
 from rendergraph.compile.transfers import UploadedValues
 from rendergraph.expand import CAMERA
 from rendergraph.gl.device import Device

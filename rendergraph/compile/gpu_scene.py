@@ -16,21 +16,21 @@ from msgspec import Struct, field
 from msgspec.structs import replace
 
 from rendergraph.compile.programs import ProgramCache
-from rendergraph.compile.scene_buffers import INSTANCES, TREE, VERTICES, SceneBuffers, check_size
+from rendergraph.errors import Problem, RenderError
 from rendergraph.expand import SCENE_DATA
 from rendergraph.gl import textures
 from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import GpuTexture
 from rendergraph.program.variants import FIXED_BLOCKS, light_macros, scene_macros, storage_blocks
-from rendergraph.scene import pack
+from rendergraph.scene import pack, scene_data
 from rendergraph.scene.animate import moving_plugin_keys
 from rendergraph.scene.facts import Decode
 from rendergraph.scene.model import ImageSource, MadeImage, Scene, Texture, changed_objects
 from rendergraph.scene.pack import PackedScene, Records
-from rendergraph.scene.scene_data import data_macros, place_instances, used_textures
+from rendergraph.scene.scene_data import BORDER, Stored, TextureArrays
 from rendergraph.scene.tree_data import MeshTrees, mesh_trees, object_rows
-from rendergraph.textures import TextureDesc, full_mip_count
+from rendergraph.textures import Sampler, TextureDesc, full_mip_count
 
 if TYPE_CHECKING:
     from rendergraph.compile.posing import Posing
@@ -69,6 +69,12 @@ SCENE_ATTRIBUTES = {
     _PREVIOUS_POSITION: "3f",
 }
 """Attributes that a vertex shader may read when it draws the scene, with moderngl's formats."""
+VERTICES, INSTANCES, TREE = "scene_vertex_texels", "scene_instance_block", "scene_tree"
+_INSTANCE_TEXELS = "scene_instance_texels"
+TEXELS = frozenset({VERTICES, _INSTANCE_TEXELS, TREE})
+"""Buffers that `scene.glsl` and `trace_tree.glsl` fetch as texels."""
+_ARRAY = "scene_array_"
+"""Prefix of the arrays' names in `scene.glsl`."""
 _SECTIONS = {"objects": "instances", "materials": "material_block", "lights": "light_block"}
 """Sections of scene files, with the source that changes if values of plugins' keys change."""
 _MOST_RUNS = 32  # of consecutive records uploaded separately; if there are more, everything between is uploaded too
@@ -79,6 +85,25 @@ class MeshIndices(Struct, frozen=True, eq=False):
     buffer: moderngl.Buffer
     commands: Records
     mode: int
+
+
+class SceneBuffers(Struct, frozen=True, eq=False):
+    """The buffers and texture arrays behind inputs of `SceneData`.
+
+    Attributes:
+        buffers: the buffers by their names in `scene.glsl`; the indices are those of geometry passes.
+        texels: textures that fetch from them, by name.
+        instances: the records that the instance buffer holds.
+        arrays: the location of each texture in the arrays.
+        textures: texture arrays by their names in `scene.glsl`; all use the same `sampler`.
+    """
+
+    buffers: dict[str, moderngl.Buffer]
+    texels: dict[str, int]
+    instances: Records
+    arrays: TextureArrays
+    textures: dict[str, GpuTexture]
+    sampler: int
 
 
 class GpuScene(Struct, eq=False, dict=True):
@@ -189,7 +214,7 @@ class GpuScene(Struct, eq=False, dict=True):
                 self._stale_instances.update(moved.tolist())
                 self.changes["instances"] += 1
                 if self._data is not None:
-                    place_instances(self._data.instances, scene, packed, moved)
+                    scene_data.place_instances(self._data.instances, scene, packed, moved)
                     write_records(self._data.buffers[INSTANCES], self._data.instances, moved)
                 if self._tree is not None:
                     trees, buffer = self._tree
@@ -219,16 +244,48 @@ class GpuScene(Struct, eq=False, dict=True):
     def data(self) -> SceneBuffers:
         """The scene's data, uploaded on first use."""
         if self._data is None:
-            used = used_textures(self.scene)
-            self.load_images(list(used.values()))
-            images = {key: self._images[texture.image, texture.srgb] for key, texture in used.items()}
-            indices = self._indices["triangles"].buffer
-            self._data = SceneBuffers.make(self.device, self.scene, self.packed, indices, images)
-            self._owned.callback(self._data.release)
+            self._data = self._upload_data()
             if self._posing is not None:
                 vertices = self._data.buffers[VERTICES]
                 self._posing.fill(vertices, vertices.size // (4 * len(self.packed.positions)))
         return self._data
+
+    def _upload_data(self) -> SceneBuffers:
+        """Upload the buffers that only `SceneData` needs, and copy the images into arrays."""
+        device, scene, packed, used = self.device, self.scene, self.packed, scene_data.used_textures(self.scene)
+        self.load_images(list(used.values()))
+        images = {key: self._images[texture.image, texture.srgb] for key, texture in used.items()}
+        instances = scene_data.instance_data(scene, packed)
+        arrays = scene_data.texture_arrays({key: image.desc for key, image in images.items()})
+        sizes = {key: image.desc.size for key, image in images.items()}
+        slots = scene_data.texture_data(scene, sizes, arrays).tobytes() if sizes else b""
+        contents = {
+            VERTICES: scene_data.vertex_data(packed).tobytes(),
+            INSTANCES: instances.tobytes() + slots,
+            "scene_emitter_block": scene_data.emitter_data(scene, packed).tobytes(),
+        }
+        for name, content in contents.items():
+            _check_size(device, name, len(content), texel=16 * (name in (VERTICES, INSTANCES)))
+        buffers = {name: self._buffer(content or bytes(128)) for name, content in contents.items()}
+        texels = {
+            VERTICES: self._texel_buffer(buffers[VERTICES], "rgba32f"),
+            _INSTANCE_TEXELS: self._texel_buffer(buffers[INSTANCES], "rgba32i"),
+        }
+        buffers["scene_index_block"] = self._indices["triangles"].buffer
+        made: dict[str, GpuTexture] = {}
+        for number, desc in enumerate(arrays.arrays):
+            made[f"{_ARRAY}{number}"] = array = textures.create(device, desc, "an array of the scene's textures")
+            self._owned.callback(textures.delete, device, array)
+        for key, (number, layer) in arrays.places.items():
+            _copy_with_border(device, images[key], made[f"{_ARRAY}{number}"], layer, key)
+        sampler = textures.create_sampler(device, Sampler("linear"))
+        self._owned.callback(device.raw.delete, "glDeleteSamplers", sampler)
+        return SceneBuffers(buffers, texels, instances, arrays, made, sampler)
+
+    def _texel_buffer(self, buffer: moderngl.Buffer, format: str) -> int:
+        texture = textures.create_texel_buffer(self.device, buffer.glo, format)
+        self._owned.callback(self.device.raw.delete, "glDeleteTextures", texture)
+        return texture
 
     def texels(self, name: str) -> int:
         """Return the GL texture of a buffer that shaders fetch as texels."""
@@ -242,10 +299,9 @@ class GpuScene(Struct, eq=False, dict=True):
         if self._tree is None:
             trees = self._mesh_trees()
             rows = object_rows(self.packed, self.data.instances["flags"], trees)
-            check_size(self.device, TREE, rows.nbytes + trees.rows.nbytes, texel=16)
+            _check_size(self.device, TREE, rows.nbytes + trees.rows.nbytes, texel=16)
             self._tree = trees, self._buffer(rows.tobytes() + trees.rows.tobytes())
-            self._tree_texture = textures.create_texel_buffer(self.device, self._tree[1].glo, "rgba32i")
-            self._owned.callback(self.device.raw.delete, "glDeleteTextures", self._tree_texture)
+            self._tree_texture = self._texel_buffer(self._tree[1], "rgba32i")
         return self._tree[1]
 
     def _mesh_trees(self) -> MeshTrees:
@@ -258,7 +314,7 @@ class GpuScene(Struct, eq=False, dict=True):
     @property
     def data_defines(self) -> dict[str, str]:
         """Macros for steps that read the scene's data."""
-        return {**self.defines, **data_macros(self.scene, self.packed, self.data.arrays)}
+        return {**self.defines, **scene_data.data_macros(self.scene, self.packed, self.data.arrays)}
 
     def drop_unused_images(self) -> None:
         """Free the images that were needed only for the texture arrays of the scene's data; call it after compiling."""
@@ -379,3 +435,25 @@ def write_records(buffer: moderngl.Buffer, records: Records, numbers: npt.NDArra
     for begin, end in pairwise(ends.tolist()):
         first = int(numbers[begin])
         buffer.write(records[first : first + end - begin].tobytes(), offset=first * records.itemsize)
+
+
+def _copy_with_border(device: Device, image: GpuTexture, array: GpuTexture, layer: int, key: Stored) -> None:
+    """Copy an image into the corner of a layer, with a border that matches its wrap modes."""
+    columns, rows = (
+        [(last if wrap == "repeat" else 0, 0, 1), (0, BORDER, last + 1), (0 if wrap == "repeat" else last, last + 2, 1)]
+        for wrap, last in zip(key[2:], (image.desc.width - 1, image.desc.height - 1), strict=True)
+    )
+    for x, to_x, width in columns:
+        for y, to_y, height in rows:
+            source = image.glo, image.target, 0, x, y, 0
+            target = array.glo, array.target, 0, to_x, to_y, layer
+            device.raw.glCopyImageSubData(*source, *target, width, height, 1)
+
+
+def _check_size(device: Device, name: str, size: int, *, texel: int = 0) -> None:
+    """Refuse a scene buffer that is larger than shaders can access; `texel`: bytes of one fetch."""
+    most = texel * device.limits["texture_buffer"] if texel else device.limits["storage_block"]
+    if size > most:
+        kind = "texture buffer" if texel else "storage block"
+        text = f"the scene's '{name}' takes {size} bytes, a {kind} of this device holds {most}"
+        raise RenderError(Problem("RG435", text))

@@ -20,10 +20,9 @@ from rendergraph.compile.bindings import Units, ViewBuffers
 from rendergraph.compile.checks import ProgramChecks, attribute_formats, check_attributes, layout_for
 from rendergraph.compile.executable import CompiledStep, Draw, Executable, SortedDraws, prefixed_reads, step_uniforms
 from rendergraph.compile.geometry import GeometryCompiler, MultiDraw, MultiDrawKey
-from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES, SCENE_ATTRIBUTES, GpuScene
+from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES, SCENE_ATTRIBUTES, TEXELS, GpuScene
 from rendergraph.compile.memory import Call, Memory, Region, TexturePool, clear_target
 from rendergraph.compile.programs import ProgramCache
-from rendergraph.compile.scene_buffers import TEXELS
 from rendergraph.compile.transfers import UploadedValues, clear_buffer, image_calls, transfer_calls
 from rendergraph.errors import InputError, RenderError
 from rendergraph.expand import ViewTable
