@@ -39,10 +39,8 @@ from rendergraph.ports import Count
 from rendergraph.projection import shifted
 from rendergraph.scene.facts import FrameScene
 from rendergraph.scene.model import Scene
-from rendergraph.steps import Change, Step, UniformValue, ViewMatrices
-from rendergraph.steps.checks import buffer as buffer_of
+from rendergraph.steps import Change, Step, UniformValue, ViewMatrices, checks
 from rendergraph.steps.checks import check_argument, declared_port
-from rendergraph.steps.checks import uniform as uniform_of
 from rendergraph.steps.model import DepthBounds
 from rendergraph.textures import BufferDesc
 from rendergraph.typecheck import Range, quoted
@@ -121,7 +119,7 @@ class FrameContext(Struct, eq=False):
         if name not in known:
             text = f"set_uniform is given {quoted(name)}, which is not a parameter or a keyword of a step"
             raise Misuse(text + (suggestion(name, known) if known else ""), "RG433")
-        mismatch = self.executable.set_uniform(self.node.id, name, uniform_of(name, value))
+        mismatch = self.executable.set_uniform(self.node.id, name, checks.uniform(name, value))
         if mismatch is not None:
             raise Misuse(f"set_uniform: {mismatch}", "RG433")
 
@@ -136,7 +134,7 @@ class FrameContext(Struct, eq=False):
         )
 
     def write(self, port: Port, values: npt.NDArray[Any]) -> None:
-        buffer_of(self.node.node.ports(), port, "write")
+        checks.buffer(self.node.node.ports(), port, "write")
         name = f"{self.node.id}.{port.name}"
         if name not in self.executable.plan.placement:
             return  # the buffer is unused in this pipeline
@@ -218,19 +216,14 @@ class Runner(Struct, eq=False):
         """The node that jitters the camera, or None."""
         return self._jittering.id if self._jittering is not None else None
 
-    @property
-    def drawn(self) -> int:
-        """The number of frames drawn since the history began."""
-        return self.executable.drawn
-
     def reset(self) -> None:
         """Reset the history to the ports' first values.
 
         After a single frame, one of its two textures still has the first value, so the next frame uses the same one. A
         history that is written in place has only one texture.
         """
-        is_double = all(count == 2 for count in self._histories.values())
-        self._repeats = is_double and (self.drawn == 1 or (self._repeats and not self.drawn))
+        drawn, is_double = self.executable.drawn, all(count == 2 for count in self._histories.values())
+        self._repeats = is_double and (drawn == 1 or (self._repeats and not drawn))
         self.executable.drawn, self._seen = 0, None
         self.executable.reset_updates()
         if self._repeats:
@@ -266,16 +259,16 @@ class Runner(Struct, eq=False):
         executable, views = self.executable, self.executable.views
         start = perf_counter()
         moved_from, self._seen = self._seen, (scene, camera)
-        if self.drawn and not moment:
+        if executable.drawn and not moment:
             views.advance()
         camera = self._jittered(camera)
         views.set(CAMERA, (camera,))
         moved = False
         if self._scene is None or self._scene.placed.objects is not scene.objects:
-            self._scene, moved = FrameScene(scene, self._scene, self.executable.scene.decode), True
+            self._scene, moved = FrameScene(scene, self._scene, executable.scene.decode), True
         self._scene.scene = scene
         updates: dict[str, float] = {}
-        has_moved, first = partial(_has_moved, moved_from, self._seen), self.drawn == 0
+        has_moved, first = partial(_has_moved, moved_from, self._seen), executable.drawn == 0
         for node in self._updating:
             before = perf_counter()
             frame = FrameContext(executable, self.graph, node, index, time, camera, self._scene, has_moved, first)
@@ -295,7 +288,7 @@ class Runner(Struct, eq=False):
                 executable.touched.add("frame_block")
         if not self._complete:
             self._check_views()
-        if not self.drawn:
+        if not executable.drawn:
             views.advance()  # nothing moves in the first frame
         executable.drawn += moment == moments - 1
         if views.changed or moved:
@@ -389,7 +382,7 @@ class Runner(Struct, eq=False):
         if node is None:
             return camera
         with _author_errors(node, "camera_jitter"):
-            moved = node.node.camera_jitter(self.drawn)
+            moved = node.node.camera_jitter(self.executable.drawn)
             check_argument("what camera_jitter returns", moved, _Offset)
         x, y = (value / side for value, side in zip(moved, camera.size, strict=True))
         return replace(camera, projection=shifted(camera.projection, 2 * x, 2 * y), jitter=(x, y))

@@ -117,13 +117,13 @@ class Drawing(Struct, eq=False, dict=True):
     def _draw(self, number: int, camera: Camera | None = None, *, moments: bool = True) -> FrameTimes:
         options, size = self.expanded.options, self.expanded.linked.graph.size
         time = ((number if options.still is None else min(number, options.still)) - 1) / options.fps
-        if self.runner.drawn:
+        if self.executable.drawn:
             self.scene.advance()
         times: list[FrameTimes] = []
         each = self._moments(time) if moments else [time]
         for part, moment in enumerate(each):
             scene = self._scene_at(moment)
-            if not self.runner.drawn:
+            if not self.executable.drawn:
                 self.scene.advance()  # the first frame has no motion
             self.camera = camera or scene.camera
             assert self.camera is not None  # a completed scene has one
