@@ -42,7 +42,7 @@ def _topics(ctx: Context, incomplete: str) -> list[str]:
 
 
 def _environments(ctx: Context, incomplete: str) -> Iterable[str]:
-    from rendergraph.scene.environments import SHIPPED
+    from rendergraph.pipelines.environments import SHIPPED
 
     return (*SHIPPED, "none")
 

@@ -119,7 +119,7 @@ def _other(topic: str, select: Select, catalog: Catalog) -> tuple[Entry, str]:
         return entry, _scene_text(entry)
     if topic in catalog:
         return {}, ""
-    from rendergraph.scene.environments import SHIPPED  # slower to import than what most topics need
+    from rendergraph.pipelines.environments import SHIPPED  # slower to import than what most topics need
 
     if topic in SHIPPED:
         use = f"rendergraph run forward --environment {topic}\nenvironment: {{file: {topic}}}  # in a scene file"
@@ -135,7 +135,7 @@ def _print(entry: Entry, text_of: Callable[[Entry], str], as_json: bool) -> None
 
 def _unknown(topic: str, types: Iterable[str]) -> str:
     from rendergraph.catalog import SHADERS
-    from rendergraph.scene.environments import SHIPPED
+    from rendergraph.pipelines.environments import SHIPPED
 
     names = [*types, *reference.FILE_KINDS, *shipped_pipelines(), *shipped_scenes(), *SHIPPED]
     if topic in names:

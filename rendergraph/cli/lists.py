@@ -50,7 +50,7 @@ scenes = _verb(
 )
 environments = _verb(
     "environments",
-    lambda: import_module("rendergraph.scene.environments").SHIPPED,
+    lambda: import_module("rendergraph.pipelines.environments").SHIPPED,
     "`rendergraph run PIPELINE --environment NAME` uses one, as does environment: {file: NAME} in a scene file",
 )
 

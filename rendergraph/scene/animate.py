@@ -13,9 +13,9 @@ from msgspec.structs import astuple, replace
 
 from rendergraph.errors import InputError, Option, Place, Problem, suggestion
 from rendergraph.facts import NO_EXTRA, Extra
+from rendergraph.pipelines.environments.surroundings import grounded, lit
 from rendergraph.scene import scene_values
 from rendergraph.scene.cameras import WIDE, bounding_sphere, framing_camera
-from rendergraph.scene.environments import grounded, lit
 from rendergraph.scene.geometry import rigid, translation, vec3
 from rendergraph.scene.model import Matrix, Orbit, Placement, Scene, Vec3
 

@@ -24,11 +24,11 @@ from rendergraph.errors import InputError, Option, Problem, suggestion
 from rendergraph.facts import NO_EXTRA, Extra
 from rendergraph.keys import Key, Table, Validator, plain
 from rendergraph.keys.values import FILE
+from rendergraph.pipelines.environments import SKIES, named
 from rendergraph.pipelines.shapes import SHAPES, ShapePart, build
 from rendergraph.pipelines.textures import TEXTURES as SHIPPED_TEXTURES
 from rendergraph.resources import is_name, shipped_scenes
 from rendergraph.scene import animate, model, scene_keys, scene_values
-from rendergraph.scene.environments import SKIES, named
 from rendergraph.scene.geometry import rigid
 from rendergraph.scene.reading import MESHES, Reading, inside, read_mesh
 from rendergraph.scene.repeat import Copies, copies, count_of, read_columns

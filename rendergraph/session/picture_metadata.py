@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 from msgspec import Struct
 
 from rendergraph.errors import InputError, Place, Problem, shown_file
+from rendergraph.pipelines.environments import SHIPPED
 from rendergraph.resources import shipped_pipelines
-from rendergraph.scene.environments import SHIPPED
 from rendergraph.session.selection import MOST_SUBFRAMES
 from rendergraph.stamps import record_read
 

@@ -13,9 +13,9 @@ from rendergraph import stamps
 from rendergraph.declare import Extensions
 from rendergraph.document import YamlLimits
 from rendergraph.errors import InputError, Option, Place, Problem
+from rendergraph.pipelines.environments import named
 from rendergraph.resolve.spec import flow
 from rendergraph.scene.animate import complete
-from rendergraph.scene.environments import named
 from rendergraph.scene.load import load
 from rendergraph.scene.model import Environment, ImageSource, Scene, SceneLimits
 from rendergraph.scene.reading import Reading

@@ -22,8 +22,8 @@ from rendergraph.catalog import Catalog
 from rendergraph.edit import PipelineText
 from rendergraph.errors import Place, Problem, RendergraphError, UsageError, shown_file
 from rendergraph.images.files import replace_text
+from rendergraph.pipelines.environments import SHIPPED
 from rendergraph.resources import shipped_pipelines, shipped_scenes
-from rendergraph.scene.environments import SHIPPED
 from rendergraph.scene.model import Camera
 from rendergraph.scene.scene_values import camera_words, described_camera
 from rendergraph.session import stages
