@@ -266,7 +266,7 @@ class Runner(Struct, eq=False):
         moved = False
         if self._scene is None or self._scene.placed.objects is not scene.objects:
             self._scene, moved = FrameScene(scene, self._scene, executable.scene.decode), True
-        self._scene.scene = scene
+        self._scene.show(scene)
         updates: dict[str, float] = {}
         has_moved, first = partial(_has_moved, moved_from, self._seen), executable.drawn == 0
         for node in self._updating:

@@ -109,7 +109,7 @@ def run(
     from rendergraph.images.video import is_film
     from rendergraph.session import RenderOptions
     from rendergraph.session.gpu import Gpu
-    from rendergraph.session.motion import film_frames
+    from rendergraph.session.scenes import film_frames
 
     def render_options(linked: Linked) -> RenderOptions:
         number, rate = linked.frames, fps or linked.fps
@@ -162,8 +162,8 @@ def _read(
     from rendergraph.images.saving import extension
     from rendergraph.images.video import ENDINGS, is_film
     from rendergraph.session import stages
-    from rendergraph.session.motion import standstill_warning
     from rendergraph.session.outputs import every_port, figures
+    from rendergraph.session.scenes import standstill_warning
 
     with track_reads() as files:
         linked = stages.link(stages.resolve(selection))

@@ -72,13 +72,12 @@ class KeptValues(Struct, eq=False):
         return self.device.ctx.buffer(reserve=made.size)
 
     def _copy(self, source: _Held, target: _Held) -> None:
-        if isinstance(source, GpuTexture) or isinstance(target, GpuTexture):
-            assert isinstance(source, GpuTexture)
-            assert isinstance(target, GpuTexture)
-            for copy in textures.copies(self.device, source, target):
-                copy()
-        else:
-            self.device.ctx.copy_buffer(target, source)
+        match source, target:
+            case GpuTexture(), GpuTexture():
+                for copy in textures.copies(self.device, source, target):
+                    copy()
+            case moderngl.Buffer(), moderngl.Buffer():
+                self.device.ctx.copy_buffer(target, source)
 
     def _delete(self, held: _Held) -> None:
         if isinstance(held, GpuTexture):

@@ -38,26 +38,10 @@ def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
     for placed in scene.objects:
         mesh, material = scene.meshes[placed.mesh], scene.materials[placed.material]
         blended, grain, emissive, reflective, layers = traits[placed.material]
-        facts.append(
-            ObjectFacts(
-                placed.name,
-                len(mesh.indices),
-                len(mesh.positions),
-                placed.casts_shadow,
-                blended,
-                material.double_sided,
-                placed.hidden,
-                grain,
-                emissive,
-                reflective,
-                mesh.name,
-                partial(attrgetter("edges.gap"), mesh),
-                partial(attrgetter("plane"), mesh),
-                partial(attrgetter("convex"), mesh),
-                placed.extra,
-                layers,
-            )
-        )
+        counts = len(mesh.indices), len(mesh.positions)
+        flags = placed.casts_shadow, blended, material.double_sided, placed.hidden, grain, emissive, reflective
+        gap, plane, convex = (partial(attrgetter(name), mesh) for name in ("edges.gap", "plane", "convex"))
+        facts.append(ObjectFacts(placed.name, *counts, *flags, mesh.name, gap, plane, convex, placed.extra, layers))
     return tuple(facts)
 
 
@@ -96,8 +80,8 @@ class FrameScene:
 
     def __init__(self, scene: Scene, before: FrameScene | None = None, decode: Decode | None = None) -> None:
         """Share unchanged values with the scene of the previous frames; `decode` is for `pixels`."""
-        self.scene = self.placed = scene
-        self.decode = decode
+        self.placed, self.decode = scene, decode
+        self.show(scene)
         if before is None or "corners" not in vars(before) or before.placed.meshes is not scene.meshes:
             return
         moved = changed_objects(before.placed, scene)
@@ -107,22 +91,11 @@ class FrameScene:
         if all(flags(before.placed.objects[number]) == flags(self.objects[number]) for number in moved):
             self.shown, self.casting = before.shown, before.casting
 
-    # `scene` is replaced even if no object moves, because lights may have changed.
-    @property
-    def lights(self) -> tuple[model.Light, ...]:
-        return self.scene.lights
-
-    @property
-    def objects(self) -> tuple[model.Object, ...]:
-        return self.scene.objects
-
-    @property
-    def materials(self) -> tuple[model.Material, ...]:
-        return self.scene.materials
-
-    @property
-    def meshes(self) -> tuple[model.Mesh, ...]:
-        return self.scene.meshes
+    def show(self, scene: Scene) -> None:
+        """Take the scene of another frame in which no object moves; lights may have changed."""
+        self.scene = scene
+        self.lights, self.objects = scene.lights, scene.objects
+        self.materials, self.meshes = scene.materials, scene.meshes
 
     @property
     def camera(self) -> model.Camera:

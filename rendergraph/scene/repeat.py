@@ -9,15 +9,12 @@ from typing import Any
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 from msgspec import Struct
 
 from rendergraph.errors import suggestion
 from rendergraph.projection import unit
-from rendergraph.scene.geometry import euler_matrix
+from rendergraph.scene.geometry import Doubles, euler_matrix
 from rendergraph.scene.model import FARTHEST, Light, Matrix
-
-Doubles = npt.NDArray[np.float64]
 
 COLUMNS = {
     "objects": {"at": 3, "rotate_degrees": 3, "scale": 1},

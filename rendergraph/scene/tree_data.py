@@ -31,9 +31,8 @@ from msgspec import Struct
 
 from rendergraph.scene.bvh import LEAF, Tree, build, depth_limit, refit, triangle_boxes
 from rendergraph.scene.model import Floats, Matrix, Scene
-from rendergraph.scene.pack import PackedScene
+from rendergraph.scene.pack import Ints, PackedScene
 
-Ints: TypeAlias = npt.NDArray[np.int32]
 Rows: TypeAlias = Ints
 
 _CELLS = 65533  # cells of a grid, with room for rounding

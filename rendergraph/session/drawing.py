@@ -22,8 +22,8 @@ from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import Camera, Scene
 from rendergraph.session.frame import Frame, OutputInfo
 from rendergraph.session.gpu import Gpu
-from rendergraph.session.motion import Driven
 from rendergraph.session.picture_metadata import frame_metadata, pipeline_metadata, turntable_metadata
+from rendergraph.session.scenes import Driven
 from rendergraph.session.values import Expanded, OutputRequest
 from rendergraph.textures import FORMATS, Semantic, TextureDesc
 from rendergraph.version import __version__

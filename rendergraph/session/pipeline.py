@@ -329,7 +329,7 @@ class Pipeline:
         from rendergraph import images
         from rendergraph.images.video import check_film, films
         from rendergraph.session.gpu import opened
-        from rendergraph.session.motion import film_frames, standstill_warning
+        from rendergraph.session.scenes import film_frames, standstill_warning
 
         path = check_film(Path(path))
         numbers = film_frames(self.link().scene, fps, frames, seconds, turntable=turntable)

@@ -32,10 +32,9 @@ from rendergraph.scene.animate import complete, on_turntable
 from rendergraph.scene.facts import camera_facts, environment_facts, light_facts, material_facts, object_facts
 from rendergraph.scene.model import Scene
 from rendergraph.scene.scene_data import scene_data_facts
-from rendergraph.session import motion
 from rendergraph.session.outputs import every_port, requested_outputs
 from rendergraph.session.picture_metadata import ENVIRONMENT_NAMES, is_picture, read_picture_metadata
-from rendergraph.session.scenes import scene_of
+from rendergraph.session.scenes import check_keyframes, scene_of
 from rendergraph.session.selection import RenderOptions, Selection
 from rendergraph.session.values import Expanded, Linked, Planned, Resolved
 from rendergraph.settings import Roots
@@ -140,7 +139,7 @@ def link(resolved: Resolved) -> Linked:
     facts = light_facts(scene), object_facts(scene), environment_facts(scene), partial(scene_data_facts, scene)
     graph = rendergraph.link.link(spec, catalog, *facts, material_facts(scene), camera_facts(scene))
     if scene.node_curves:
-        graph = replace(graph, warnings=(*graph.warnings, *motion.check_keyframes(graph, scene)))
+        graph = replace(graph, warnings=(*graph.warnings, *check_keyframes(graph, scene)))
     return Linked(**asdict(resolved), scene=scene, graph=graph)
 
 

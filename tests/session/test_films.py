@@ -17,7 +17,7 @@ from rendergraph.images import read
 from rendergraph.scene import animate
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.load import load
-from rendergraph.session.motion import film_frames
+from rendergraph.session.scenes import film_frames
 
 SIZE = (48, 28)
 MOVING = """scene: 1
