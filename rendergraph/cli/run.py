@@ -162,8 +162,8 @@ def _read(
     from rendergraph.images.saving import extension
     from rendergraph.images.video import ENDINGS, is_film
     from rendergraph.session import stages
-    from rendergraph.session.outputs import every_port, figures
     from rendergraph.session.scenes import standstill_warning
+    from rendergraph.session.values import every_port, figures
 
     with track_reads() as files:
         linked = stages.link(stages.resolve(selection))

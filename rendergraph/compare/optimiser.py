@@ -20,8 +20,8 @@ from rendergraph.compare.space import Axes, Axis, Space, typed
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.installed import require
 from rendergraph.session import Pipeline
-from rendergraph.session.outputs import figures
 from rendergraph.session.progress import report_progress
+from rendergraph.session.values import figures
 
 BATCH_SIZE = 8
 """Runs that the optimiser suggests at a time; they are rendered together."""

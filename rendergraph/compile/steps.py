@@ -27,7 +27,6 @@ from rendergraph.compile.transfers import UploadedValues, clear_buffer, image_ca
 from rendergraph.errors import InputError, RenderError
 from rendergraph.expand import ViewTable
 from rendergraph.gl import state as gl_state
-from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.gl.queries import OcclusionQuery, Timer
 from rendergraph.gl.raw import RawGL
@@ -49,7 +48,6 @@ _TEXTURE_2D, _DEPTH_BOUNDS_TEST, _CLIP_DISTANCE0 = 0x0DE1, 0x8890, 0x3000
 
 
 def compile_plan(
-    device: Device,
     plan: ResourcePlan,
     types: Mapping[str, NodeType],
     views: Mapping[str, ViewTable],
@@ -64,6 +62,7 @@ def compile_plan(
     Args:
         poison: overwrite textures after their last use with a value that no picture should show.
     """
+    device = programs.device
     check_plan(device.limits, plan, views)
     with ExitStack() as owned:
         memory = Memory(device, plan, scene.resource, pool)
@@ -71,7 +70,7 @@ def compile_plan(
         buffers = ViewBuffers(device, views)
         owned.callback(buffers.release)
         owned.callback(programs.forget, id(memory))
-        made = _Compiler(device, plan, types, views, scene, programs, memory, buffers, poison, owned).executable()
+        made = _Compiler(types, views, scene, programs, memory, buffers, poison, owned).executable()
         made.owned = owned.pop_all()
         return made
 
@@ -101,8 +100,6 @@ class CountedDraw(Struct, eq=False):
 
 
 class _Compiler(Struct, eq=False, dict=True):
-    device: Device
-    plan: ResourcePlan
     types: Mapping[str, NodeType]
     view_tables: Mapping[str, ViewTable]
     scene: GpuScene
@@ -113,6 +110,7 @@ class _Compiler(Struct, eq=False, dict=True):
     owned: ExitStack
 
     def __post_init__(self) -> None:
+        self.device, self.plan = self.memory.device, self.memory.plan
         self._texts = StepTexts(self.types, self.plan.resources, self.view_tables).of
         self.units = Units(self.device, self.memory.parities)
         self.geometry = GeometryCompiler(self.scene, self.owned)

@@ -6,7 +6,7 @@ import contextlib
 import os
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -108,11 +108,6 @@ def shared(device: int | None) -> Gpu:
     return gpu
 
 
-@contextmanager
-def opened(gpu: Gpu | None, device: int | None) -> Iterator[Gpu]:
-    """Yield the given `Gpu`, or one that is closed with the block."""
-    if gpu is not None:
-        yield gpu
-        return
-    with Gpu(device) as own:
-        yield own
+def opened(gpu: Gpu | None, device: int | None) -> AbstractContextManager[Gpu]:
+    """Return a context manager for the given `Gpu`, or for one that is closed with the block."""
+    return Gpu(device) if gpu is None else contextlib.nullcontext(gpu)

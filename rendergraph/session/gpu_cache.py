@@ -102,9 +102,7 @@ class GpuCache:
         types, views, poison = linked.node_types, planned.expansion.views, planned.options.poison
         try:
             with stamps.track_reads() as files:
-                executable = compile_plan(
-                    self._device, planned.plan, types, views, scene, self.programs, self._pool, poison=poison
-                )
+                executable = compile_plan(planned.plan, types, views, scene, self.programs, self._pool, poison=poison)
             self._entries[key] = executable, files
         finally:
             self.programs.trim({program for kept in self.executables for program in kept.programs})

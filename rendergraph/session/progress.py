@@ -18,7 +18,7 @@ _WIDTH = 30
 def report_progress(progress: Progress | bool | None, word: str | Callable[[], str]) -> Iterator[Progress]:
     """Yield the function to call: the one that was given, a `Bar` for `True`, else one that does nothing."""
     if progress is not True:
-        yield progress or _ignore
+        yield progress or (lambda done, total: None)
         return
     bar = Bar(word)
     try:
@@ -67,7 +67,3 @@ def _pace(done: int, left: int, seconds: float) -> str:
     wait = left * seconds / done
     time_left = f"{wait:.0f} s" if wait < 120 else f"{wait / 60:.0f} min" if wait < 7200 else f"{wait / 3600:.1f} h"
     return f", {done / seconds:.3g} per second, {time_left} left"
-
-
-def _ignore(done: int, total: int) -> None:
-    pass

@@ -32,11 +32,10 @@ from rendergraph.scene.animate import complete, on_turntable
 from rendergraph.scene.facts import camera_facts, environment_facts, light_facts, material_facts, object_facts
 from rendergraph.scene.model import Scene
 from rendergraph.scene.scene_data import scene_data_facts
-from rendergraph.session.outputs import every_port, requested_outputs
 from rendergraph.session.picture_metadata import ENVIRONMENT_NAMES, is_picture, read_picture_metadata
 from rendergraph.session.scenes import check_keyframes, scene_of
 from rendergraph.session.selection import RenderOptions, Selection
-from rendergraph.session.values import Expanded, Linked, Planned, Resolved
+from rendergraph.session.values import Expanded, Linked, Planned, Resolved, every_port, requested_outputs
 from rendergraph.settings import Roots
 
 if TYPE_CHECKING:

@@ -23,9 +23,8 @@ from rendergraph.session import stages
 from rendergraph.session.drawing import Drawing
 from rendergraph.session.frame import Frame, OutputInfo
 from rendergraph.session.gpu import Gpu
-from rendergraph.session.outputs import every_port
 from rendergraph.session.selection import RenderOptions, Selection
-from rendergraph.session.values import Expanded, Linked, Planned
+from rendergraph.session.values import Expanded, Linked, Planned, every_port
 from rendergraph.stamps import Stamps
 from rendergraph.textures import TextureDesc
 from rendergraph.viewer import editing, messages

@@ -213,7 +213,6 @@ def test_a_lifetime_that_ends_too_early_is_caught(bench: Any) -> None:
         with session.device.current():
             scene = session.cache.upload(pipeline.link())
             broken = compile_plan(
-                session.device,
                 wrong,
                 types,
                 views,

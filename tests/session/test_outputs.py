@@ -12,7 +12,7 @@ import pytest
 import rendergraph as rg
 from rendergraph.api import Any, Depth, Internal, Node, Output, State, Stencil, StencilFace, Steps
 from rendergraph.errors import InputError
-from rendergraph.session.outputs import figures
+from rendergraph.session.values import figures
 
 NUMBER = "uniform float number; out float r; void main() { r = number; }"
 TRIANGLE = """vec2 corners[3] = vec2[](vec2(-1, -1), vec2(1, -1), vec2(-1, 1));
