@@ -20,16 +20,7 @@ from rendergraph.compile.light_means import LightMeans, averaged_textures
 from rendergraph.declare import Node, Port, Views
 from rendergraph.declare.blame import author_problem
 from rendergraph.document import shown
-from rendergraph.errors import (
-    InputError,
-    Misuse,
-    Problem,
-    RenderError,
-    SceneError,
-    is_interruption,
-    node_named,
-    suggestion,
-)
+from rendergraph.errors import InputError, Misuse, Problem, RenderError, SceneError, is_interruption, suggestion
 from rendergraph.expand import CAMERA
 from rendergraph.gl import textures
 from rendergraph.gl.queries import Timer
@@ -393,7 +384,7 @@ class Runner(Struct, eq=False):
             maker = name.rpartition(".")[0]
             if table.count and maker in self._active and name not in self.executable.views.current:
                 node = self.graph[maker]
-                text = f"{node_named(maker, node.type.name)} never sets the views of '{name}'; do so in `update`"
+                text = f"{node.title} never sets the views of '{name}'; do so in `update`"
                 raise InputError(Problem("RG433", text, node.place))
         self._complete = True
 
@@ -456,14 +447,14 @@ def _author_errors(node: GraphNode, method: str) -> Iterator[None]:
     except RenderError:
         raise
     except SceneError as error:  # addressed to the user
-        text = f"{node_named(node.id, node.type.name)}: {shown(error, 200)}"
+        text = f"{node.title}: {shown(error, 200)}"
         raise InputError(Problem("RG209", text, node.place)) from error
     except BaseException as error:
         if is_interruption(error):
             raise
         code = error.code if isinstance(error, Misuse) and error.code == "RG432" else "RG433"
         problem = author_problem(error, type(node.node), node.type.file)
-        doing = f"{node_named(node.id, node.type.name)} failed in {method}"
+        doing = f"{node.title} failed in {method}"
         raise InputError(problem.relocate(node.place, code=code, context=doing)) from error
 
 

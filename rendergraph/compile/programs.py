@@ -31,10 +31,6 @@ class ProgramCache(Struct, eq=False):
     _programs: dict[tuple[object, ...], Program] = field(default_factory=dict)
     _vertex_arrays: dict[tuple[object, ...], Any] = field(default_factory=dict)
 
-    @property
-    def alive(self) -> int:
-        return len(self._programs)
-
     def get(self, texts: Mapping[str, StageText], blocks: Mapping[str, int], outputs: Sequence[str]) -> Program:
         sources = {stage: text.text for stage, text in texts.items()}
         key = (*sources.items(), tuple(outputs), tuple(sorted(blocks.items())))

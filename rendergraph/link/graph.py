@@ -13,7 +13,7 @@ from msgspec import Struct, field
 from rendergraph.catalog import NodeType
 from rendergraph.declare import Facts, Node, TextureInfo
 from rendergraph.document import Value
-from rendergraph.errors import Place, Problem
+from rendergraph.errors import Place, Problem, node_named
 from rendergraph.facts import SELECTIONS
 from rendergraph.ports import Texel
 from rendergraph.textures import Sampler
@@ -57,6 +57,11 @@ class GraphNode(Struct, frozen=True):
     choices: Mapping[str, Path] = field(default_factory=dict)
     samplers: Mapping[str, Sampler] = field(default_factory=dict)
     clears: Mapping[str, Texel | None] = field(default_factory=dict)
+
+    @property
+    def title(self) -> str:
+        """How messages name it."""
+        return node_named(self.id, self.type.name)
 
 
 class Graph(Struct, frozen=True, dict=True):

@@ -21,12 +21,10 @@ Decode: TypeAlias = Callable[[ImageSource, bool], npt.NDArray[Any]]
 
 
 def selected(scene: Scene, name: str) -> list[int]:
-    takes = SELECTIONS[name]
-    return [
-        number
-        for number, placed in enumerate(scene.objects)
-        if not placed.hidden and takes(placed.casts_shadow, scene.is_blended(scene.materials[placed.material]))
-    ]
+    """Return the objects that a keyword of `SELECTIONS` names, without hidden ones."""
+    takes, blended = SELECTIONS[name], [scene.is_blended(material) for material in scene.materials]
+    objects = enumerate(scene.objects)
+    return [number for number, one in objects if not one.hidden and takes(one.casts_shadow, blended[one.material])]
 
 
 def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
@@ -122,8 +120,7 @@ class FrameScene:
 
     @cached_property
     def catchers(self) -> npt.NDArray[np.int64]:
-        numbers = self.scene.catchers
-        return np.array([number for number in numbers if self.shown[number]], np.int64)
+        return np.array([number for number in self.scene.catchers if self.shown[number]], np.int64)
 
     @cached_property
     def bounds(self) -> tuple[model.Vec3, model.Vec3]:

@@ -33,7 +33,6 @@ Floats: TypeAlias = npt.NDArray[np.float32]
 Matrix: TypeAlias = npt.NDArray[np.float64]
 Vec3: TypeAlias = tuple[float, float, float]
 
-
 FARTHEST = 1e12
 """Limit of numbers in a mesh: products of a few larger ones would exceed single precision."""
 

@@ -51,8 +51,7 @@ class Drawing(Struct, eq=False, dict=True):
     _set_values: dict[tuple[str, str], Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        options = self.expanded.options
-        linked = self.expanded.linked
+        options, linked = self.expanded.options, self.expanded.linked
         self._driven = Driven(linked.graph, linked.scene, self.executable)
         self.runner = Runner(self.executable, linked.graph, options.reuses, options.cull)
         history = any(r.role == "history" for r in self.executable.plan.resources.values())
