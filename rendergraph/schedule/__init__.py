@@ -30,7 +30,7 @@ from rendergraph.schedule.dependencies import (
     read_first_choices,
 )
 from rendergraph.schedule.model import Cost, Frame, Model, alive_all_frame
-from rendergraph.schedule.search import improve, program_order, random_order, search, seeds
+from rendergraph.schedule.search import improve, random_order, search, seeds
 from rendergraph.steps import MOST_STEPS, Resource, Step
 
 # Resources visited per second of budget: a count, so that slow and fast machines find the same schedule.
@@ -53,7 +53,7 @@ class Schedule(Struct, frozen=True, dict=True):
         waits: step key to the steps that it waits for, with the resource as reason and `reads`, `continues` or
             `overwrites`; empty for a schedule written by hand.
         model: the same as integers; None for a schedule written by hand.
-        chosen: how the order was chosen if not by memory: `in the program's order`.
+        shuffle: the seed of an order that was drawn instead of chosen by memory.
     """
 
     steps: tuple[Step, ...]
@@ -67,7 +67,7 @@ class Schedule(Struct, frozen=True, dict=True):
     whole_frame: frozenset[str] = frozenset()
     waits: Waits = field(default_factory=dict)
     model: Model | None = None
-    chosen: str | None = None
+    shuffle: int | None = None
 
     @property
     def proven(self) -> bool:
@@ -85,7 +85,7 @@ class Schedule(Struct, frozen=True, dict=True):
         if self.model is None:
             return {}
         number_of = {step.key: number for number, step in enumerate(self.model.steps)}
-        return order_reasons(self.model, [number_of[step.key] for step in self.steps], self.chosen)
+        return order_reasons(self.model, [number_of[step.key] for step in self.steps], self.shuffle)
 
     @cached_property
     def history_copies(self) -> Mapping[str, int]:
@@ -93,9 +93,7 @@ class Schedule(Struct, frozen=True, dict=True):
         return history_copies(self.steps, self.resources)
 
 
-def schedule(
-    expansion: Expansion, *, budget_s: float = 0.5, shuffle: int | None = None, keep_order: bool = False
-) -> Schedule:
+def schedule(expansion: Expansion, *, budget_s: float = 0.5, shuffle: int | None = None) -> Schedule:
     """Cull the steps that no output needs and order the rest to allocate the least memory.
 
     The result depends only on links, ports and sizes, not on the order of nodes or keys in a file or on the machine.
@@ -103,7 +101,6 @@ def schedule(
     Args:
         budget_s: limit of the search in seconds of a typical machine; it counts visited resources, not time.
         shuffle: seed of a random legal order instead, for tests.
-        keep_order: use the program's order instead, for debugging; takes precedence over `shuffle`.
     """
     if len(expansion.steps) > MOST_STEPS:
         (node, most), *_ = Counter(step.node for step in expansion.steps).most_common(1)
@@ -122,14 +119,10 @@ def schedule(
     whole_frame = frozenset(alive_all_frame(resources, kept_versions))
     frame = Frame(kept, resources, shown, whole_frame, sinks)
     found = _least(frame, waits, read_first_choices(waits, kept, kept_versions, resources), budget_s)
-    model, order, chosen = found.model, found.order, None
-    if keep_order or shuffle is not None:
+    model, order = found.model, found.order
+    if shuffle is not None:
         model = Model.of(frame, waits)
-        if shuffle is None or keep_order:
-            rank = {step.key: number for number, step in enumerate(expansion.steps)}
-            order, chosen = program_order(model, [rank[step.key] for step in model.steps]), "in the program's order"
-        else:
-            order, chosen = random_order(model, shuffle), f"drawn by seed {shuffle}"
+        order = random_order(model, shuffle)
     steps = tuple(model.steps[number] for number in order)
     model = replace(model, constant=frame.constant(history_copies(steps, resources)))
     peak, peak_step = model.peak(order)
@@ -145,7 +138,7 @@ def schedule(
         whole_frame=whole_frame,
         waits=waits,
         model=model,
-        chosen=chosen,
+        shuffle=shuffle,
     )
 
 
@@ -246,8 +239,8 @@ def step_names(steps: Sequence[Step]) -> dict[tuple[str, int], str]:
     return names | {step.key: step.label for step in steps if step.kind == "copy"}
 
 
-def order_reasons(model: Model, order: Sequence[int], chosen: str | None) -> dict[tuple[str, int], str]:
-    """Return by step key the reason for its position; `chosen` is how the order was chosen if not by memory."""
+def order_reasons(model: Model, order: Sequence[int], shuffle: int | None) -> dict[tuple[str, int], str]:
+    """Return by step key the reason for its position; `shuffle` is the seed of an order that was drawn."""
     names = step_names(model.steps)
     place = {step: number for number, step in enumerate(order)}
     left = list(model.toucher_count)
@@ -270,8 +263,8 @@ def order_reasons(model: Model, order: Sequence[int], chosen: str | None) -> dic
             release = f"releases {model.names[largest]}{more} ({format_bytes(sum(model.sizes[r] for r in freed))})"
         if waiting == 1:
             text = "nothing else can run yet" if number + 1 < len(order) else "everything else has run"
-        elif chosen:
-            text = f"{chosen}, of {waiting} that could run"
+        elif shuffle is not None:
+            text = f"drawn by seed {shuffle}, of {waiting} that could run"
         elif step == ready[0]:
             text = f"first of {waiting} that could run, reading from the outputs"
         else:

@@ -115,14 +115,9 @@ def list_schedule(model: Model, *, backwards: bool = False) -> list[int]:
 def random_order(model: Model, seed: int) -> list[int]:
     import random  # rarely needed
 
-    rank = list(range(len(model)))
-    random.Random(seed).shuffle(rank)
-    return program_order(model, rank)
-
-
-def program_order(model: Model, rank: Sequence[int]) -> list[int]:
-    """Return the order of `rank`, the position of each step in the program, as far as it is legal."""
-    return upstream_first({step: model.before[step] for step in sorted(range(len(model)), key=rank.__getitem__)})
+    steps = list(range(len(model)))
+    random.Random(seed).shuffle(steps)
+    return upstream_first({step: model.before[step] for step in steps})
 
 
 def search(model: Model, *, below: int, bound: int, budget: int) -> tuple[list[int] | None, int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator, Sequence
 
-from rendergraph.allocate.heap import HeapItem, least_bytes, share_blocks
+from rendergraph.allocate import HeapItem, least_bytes, share_blocks
 
 
 def ways(items: list[HeapItem]) -> Iterator[list[list[int]]]:

@@ -244,14 +244,6 @@ def test_results_do_not_depend_on_the_order_of_nodes_or_keys() -> None:
         assert schedule(replace(base, steps=tuple(steps), resources=dict(resources))) == first
 
 
-def test_keep_order_is_the_program_s() -> None:
-    base = fan_out(3)
-    kept = schedule(base, keep_order=True)
-    assert kept.steps == base.steps
-    assert kept.peak_bytes > schedule(base).peak_bytes == kept.lower_bound_bytes
-    assert "in the program's order" in kept.reasons["draw1", 0]
-
-
 def test_shuffle_draws_by_seed() -> None:
     orders = {tuple(order(schedule(fan_out(3), shuffle=seed))) for seed in range(20)}
     assert len(orders) > 5
