@@ -18,7 +18,7 @@ from rendergraph.gl import textures
 from rendergraph.gl.textures import GpuTexture
 from rendergraph.program.text import VERSION
 from rendergraph.resources import folder
-from rendergraph.steps import ADD, State
+from rendergraph.steps.model import ADD, State
 from rendergraph.textures import Semantic, TextureDesc
 
 _ALL_BARRIERS = 0xFFFFFFFF

@@ -15,8 +15,8 @@ from rendergraph.compile.memory import Call, Memory
 from rendergraph.errors import Misuse, Place, shown_file
 from rendergraph.gl import textures
 from rendergraph.scene.facts import FrameScene
-from rendergraph.steps import Read, Step, Upload, Write
 from rendergraph.steps.checks import texels
+from rendergraph.steps.model import Read, Step, Upload, Write
 from rendergraph.textures import FORMATS, BufferDesc
 
 _COLOR, _NEAREST = 0x4000, 0x2600

@@ -13,17 +13,7 @@ from pathlib import Path
 from typing import TextIO
 
 from rendergraph.document.parsing import YamlLimits, over_limit, parse, scalar
-from rendergraph.document.values import (
-    BROKEN,
-    Document,
-    Source,
-    Value,
-    describe,
-    from_plain,
-    kind_of,
-    merge_patch,
-    shown,
-)
+from rendergraph.document.values import BROKEN, Document, Source, Value, describe, from_plain, merge_patch, shown
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.stamps import record_read
 from rendergraph.system import STDIN

@@ -17,7 +17,7 @@ from rendergraph.expand.recording import OF_SCENE, SCENE_DATA, define_parameters
 from rendergraph.expand.versions import VersionAssignment, ViewTable
 from rendergraph.link import Endpoint, Graph
 from rendergraph.link.infer import CAMERA
-from rendergraph.steps import Read, Resource, Role, Step, Write
+from rendergraph.steps.model import Read, Resource, Role, Step, Write
 
 
 class Expansion(Struct, frozen=True):

@@ -13,18 +13,8 @@ from rendergraph.expand.recording import OF_SCENE, SCENE_DATA, Recording, is_kep
 from rendergraph.expand.targets import overlap, parts_written, refusals, target_size
 from rendergraph.link import Endpoint, Graph
 from rendergraph.link.infer import CAMERA
-from rendergraph.steps import (
-    BUFFER_OPTIONS,
-    FunctionBinding,
-    Read,
-    Resource,
-    Role,
-    Step,
-    StepRequest,
-    Use,
-    Where,
-    Write,
-)
+from rendergraph.steps import BUFFER_OPTIONS, StepRequest
+from rendergraph.steps.model import FunctionBinding, Read, Resource, Role, Step, Use, Where, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
 
 _COPIED_OPTIONS = frozenset(

@@ -5,15 +5,4 @@ A `Worker` runs a `Task`; an `Executor` takes tasks and reports `Event`s. Result
 
 from __future__ import annotations
 
-from rendergraph.farm.tasks import (
-    Event,
-    Executor,
-    Handle,
-    Serial,
-    Task,
-    TaskFailed,
-    TaskFinished,
-    TaskOutput,
-    TaskRetried,
-    Worker,
-)
+from rendergraph.farm.tasks import Executor, Handle, Task, TaskFailed, TaskFinished, TaskOutput, TaskRetried, Worker

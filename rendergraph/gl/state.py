@@ -17,7 +17,7 @@ from msgspec import Struct
 
 from rendergraph.errors import Problem, RenderError
 from rendergraph.gl.raw import RawGL
-from rendergraph.steps import Compare, State, Stencil
+from rendergraph.steps.model import Compare, State, Stencil
 
 _COMPARE = {name: 0x200 + number for number, name in enumerate(get_args(Compare))}
 _STENCIL_OP = {

@@ -6,18 +6,5 @@ of a file, `rendergraph explain`, the reference pages and the JSON Schemas for e
 
 from __future__ import annotations
 
-from rendergraph.keys.tables import (
-    Key,
-    MapOf,
-    Naming,
-    Recursive,
-    Table,
-    Type,
-    as_markdown,
-    brief,
-    file_schema,
-    nullable,
-    plain,
-    schema,
-)
+from rendergraph.keys.tables import Key, MapOf, Naming, Recursive, Table, as_markdown, brief, file_schema, plain, schema
 from rendergraph.keys.validator import MOST_PROBLEMS, Codes, Validator

@@ -8,26 +8,5 @@ from __future__ import annotations
 
 from rendergraph.steps.checks import define_text
 from rendergraph.steps.frame import Change, Frame, FrameScene, ViewMatrices
-from rendergraph.steps.model import (
-    ADD,
-    ALPHA,
-    MOST_STEPS,
-    MULTIPLY,
-    PREMULTIPLIED,
-    Blend,
-    Compare,
-    FunctionBinding,
-    Read,
-    Resource,
-    Role,
-    State,
-    Stencil,
-    StencilFace,
-    Step,
-    UniformValue,
-    Upload,
-    Use,
-    Where,
-    Write,
-)
+from rendergraph.steps.model import MOST_STEPS, FunctionBinding, Read, Resource, State, Step, UniformValue, Write
 from rendergraph.steps.recorder import BUFFER_OPTIONS, StepRequest, Steps

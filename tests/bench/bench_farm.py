@@ -21,7 +21,7 @@ import rendergraph as rg
 from rendergraph.compare.batches import MOST_RUNS
 from rendergraph.compare.engine import Sweep, sweep
 from rendergraph.compare.tasks import VariantTask
-from rendergraph.farm import Event, Serial, Task, TaskFinished, TaskOutput, Worker
+from rendergraph.farm.tasks import Event, Serial, Task, TaskFinished, TaskOutput, Worker
 
 AXES: dict[str, list[float | str]] = {
     "shadows.taps": [1, 2, 3, 4],

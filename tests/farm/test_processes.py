@@ -14,8 +14,9 @@ from typing import Any
 import pytest
 
 from rendergraph.errors import DeviceError, UsageError
-from rendergraph.farm import Serial, TaskFailed, TaskFinished, TaskOutput, TaskRetried, worker_process
+from rendergraph.farm import worker_process
 from rendergraph.farm.executors import Processes, make_executor
+from rendergraph.farm.tasks import Serial, TaskFailed, TaskFinished, TaskOutput, TaskRetried
 
 Chores = Callable[..., Any]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rendergraph.errors import InputError, Problem, RenderError
-from rendergraph.farm import Event, Serial, Task, TaskFailed, TaskFinished, TaskOutput, Worker
+from rendergraph.farm.tasks import Event, Serial, Task, TaskFailed, TaskFinished, TaskOutput, Worker
 
 
 @dataclass(frozen=True)
