@@ -13,6 +13,7 @@ import re
 import sys
 from collections.abc import Iterable, Iterator
 from functools import lru_cache, reduce
+from importlib.machinery import ModuleSpec
 from typing import Any
 
 from msgspec import Struct
@@ -122,11 +123,19 @@ def _entry_points_of(package: Package, state: Stamp) -> list[EntryPoint]:
     return found
 
 
+def module_spec(name: str) -> ModuleSpec | None:
+    """Return where a module comes from; None if there is no such module, or its parent cannot be imported."""
+    from importlib.util import find_spec  # most commands need none
+
+    try:
+        return find_spec(name)
+    except (ImportError, ValueError, AttributeError):
+        return None
+
+
 def require(feature: str, extra: str, *modules: str) -> None:
     """Check that the `modules` of an extra are installed, which a feature needs."""
-    from importlib.util import find_spec  # only features with an extra need it
-
-    missing = [name.replace("_", "-") for name in modules if find_spec(name) is None]
+    missing = [name.replace("_", "-") for name in modules if module_spec(name) is None]
     if missing:
         text = f"{feature} needs {', '.join(missing)}; pip install 'rendergraph[{extra}]'"
         raise UsageError(Problem("RG500", text))

@@ -14,7 +14,6 @@ import sys
 import tempfile
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -22,6 +21,7 @@ from rendergraph import api
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import RESERVED_NAMES
 from rendergraph.errors import InputError, Place, Problem, RenderError, suggestion
+from rendergraph.installed import module_spec
 from rendergraph.keys import as_markdown, file_schema
 from rendergraph.resources import folder, shipped_pipelines, shipped_scenes
 from rendergraph.scene.scene_keys import SCENE
@@ -218,10 +218,7 @@ def _name_mistake(name: str, existing: Set[str]) -> str:
 
 
 def _is_installed(name: str) -> bool:
-    try:
-        spec = find_spec(name)
-    except (ImportError, ValueError):
-        return False
+    spec = module_spec(name)
     return spec is not None and spec.origin is not None and Path(spec.origin).parent != Path.cwd()
 
 

@@ -24,7 +24,7 @@ from rendergraph.catalog.types import PREFIX, SHADERS, Listed, fresh_package, sh
 from rendergraph.declare.blame import describe_error, source_location
 from rendergraph.declare.extensions import Extension, Extensions, Source, extension_mistakes
 from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
-from rendergraph.installed import EntryPoint, plain
+from rendergraph.installed import EntryPoint, module_spec, plain
 from rendergraph.settings import expand_home, nearest_settings
 from rendergraph.stamps import FileCache, record_read
 
@@ -92,10 +92,7 @@ def _project(folder: Path) -> str:
 
 def package(plugin: str, package: str) -> Iterator[tuple[str, Listed]]:
     """Yield the modules of an installed package; only its parent package is imported."""
-    try:
-        spec = importlib.util.find_spec(package)
-    except (ImportError, ValueError, AttributeError):
-        spec = None
+    spec = module_spec(package)
     if spec is None:  # an entry left behind by a half-removed package: only its nodes are missing
         return
     if not spec.submodule_search_locations:

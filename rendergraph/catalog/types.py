@@ -7,7 +7,7 @@ usual.
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import re
 import sys
 from collections.abc import Mapping, Sequence
@@ -21,6 +21,7 @@ from msgspec import Struct
 from rendergraph.declare import Input, Node, Views, WrittenPort, declaration_mistakes
 from rendergraph.declare.blame import declaration_of, describe_error, source_location
 from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
+from rendergraph.installed import module_spec
 from rendergraph.resources import folder
 from rendergraph.stamps import Stamp, modified, record_read, replay_reads, track_reads
 
@@ -177,10 +178,7 @@ def shader_folder(package: str) -> Path | None:
     parent, _, last = package.rpartition(".")
     if not parent or last != "nodes":
         return None
-    try:
-        spec = importlib.util.find_spec(f"{parent}.shaders")
-    except (ImportError, ValueError, AttributeError):
-        return None
+    spec = module_spec(f"{parent}.shaders")
     folders = spec.submodule_search_locations if spec else None
     return Path(next(iter(folders))) if folders else None
 

@@ -11,15 +11,17 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import partial
 from importlib.machinery import ModuleSpec
-from importlib.util import find_spec, resolve_name
+from importlib.util import resolve_name
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rendergraph.catalog.catalog import NOTEBOOK
 from rendergraph.errors import InputError
 from rendergraph.farm.bundle import file_sha256
-from rendergraph.program import stage_texts, text_key
+from rendergraph.installed import module_spec
+from rendergraph.program import TextSources, stage_texts, text_key
 from rendergraph.stamps import FileCache, record_read
+from rendergraph.steps import Step
 from rendergraph.version import __version__
 
 if TYPE_CHECKING:
@@ -82,16 +84,16 @@ def _read_digest(path: Path) -> str:
 def _shader_texts(expanded: Expanded) -> Iterator[str]:
     expansion = expanded.expansion
     types = {node.id: node.type for node in expanded.linked.graph.nodes}
+    sources = TextSources(types, expansion.resources, expansion.views)
     for step in expansion.steps:
-        sources = step, types, expansion.resources, expansion.views
         try:
-            yield _TEXTS.get(text_key(*sources), partial(_stages_digest, *sources))
+            yield _TEXTS.get(text_key(step, sources), partial(_stages_digest, step, sources))
         except InputError as error:  # reported at its place when the run is rendered
             yield str(error)
 
 
-def _stages_digest(*step_and_sources: Any) -> str:
-    return _texts_digest(text.text for text in stage_texts(*step_and_sources).values())
+def _stages_digest(step: Step, sources: TextSources) -> str:
+    return _texts_digest(text.text for text in stage_texts(step, sources).values())
 
 
 def _code(graph: Graph) -> Iterator[str]:
@@ -124,10 +126,7 @@ def _spec(name: str) -> ModuleSpec | None:
     """Return where a module comes from, whether or not it has been imported: another process may have done so."""
     if (module := sys.modules.get(name)) is not None:
         return module.__spec__
-    try:
-        return find_spec(name)
-    except (ImportError, AttributeError, ValueError):  # the name is that of something within a module
-        return None
+    return module_spec(name)  # None if the name is that of something within a module
 
 
 def _imported_names(file: Path, package: str) -> list[str]:

@@ -33,7 +33,7 @@ from rendergraph.gl.raw import RawGL
 from rendergraph.gl.textures import Clear, poison_value
 from rendergraph.glsl.globals import declared_blocks
 from rendergraph.glsl.names import compiled_text
-from rendergraph.program import StageText, StepTexts, positions_macro
+from rendergraph.program import StageText, StepTexts, TextSources, positions_macro
 from rendergraph.program.checks import Texts, check_kept_text, check_scene_includes, missing
 from rendergraph.program.limits import check_plan, groups_of
 from rendergraph.program.variants import FIXED_BLOCKS, view_count
@@ -111,7 +111,7 @@ class _Compiler(Struct, eq=False, dict=True):
 
     def __post_init__(self) -> None:
         self.device, self.plan = self.memory.device, self.memory.plan
-        self._texts = StepTexts(self.types, self.plan.resources, self.view_tables).of
+        self._texts = StepTexts(TextSources(self.types, self.plan.resources, self.view_tables)).of
         self.units = Units(self.device, self.memory.parities)
         self.geometry = GeometryCompiler(self.scene, self.owned)
         self._barrier = partial(self.device.raw.glMemoryBarrier, _ALL_BARRIERS)

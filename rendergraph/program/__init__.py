@@ -15,4 +15,4 @@ knows; the same holds for other functions, by their name.
 from __future__ import annotations
 
 from rendergraph.program.checks import check_texts, ray_warnings, used_blocks, used_names
-from rendergraph.program.text import StageText, StepTexts, positions_macro, prefix, stage_texts, text_key
+from rendergraph.program.text import StageText, StepTexts, TextSources, positions_macro, prefix, stage_texts, text_key

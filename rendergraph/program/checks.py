@@ -12,10 +12,9 @@ from functools import lru_cache, partial
 from rendergraph.catalog import NodeType
 from rendergraph.declare import Node
 from rendergraph.errors import InputError, Place, Problem, nearest, shown_file, suggestion
-from rendergraph.expand import ViewTable
 from rendergraph.glsl.globals import declared_blocks, declared_samplers, globals_of
 from rendergraph.glsl.names import compiled_text, reachable_names
-from rendergraph.program.text import StageText, prefix, stage_texts, text_key
+from rendergraph.program.text import StageText, TextSources, prefix, stage_texts, text_key
 from rendergraph.stamps import FileCache
 from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import FORMATS, GLSL_SHAPES, TextureDesc
@@ -49,16 +48,12 @@ _OF_SCENE_DATA = ("light_block", "material_block")
 _OF_SCENE = ("scene.glsl", "previous_scene.glsl", "trace.glsl")
 
 
-def check_texts(
-    steps: Iterable[Step],
-    types: Mapping[str, NodeType],
-    resources: Mapping[str, Resource],
-    views: Mapping[str, ViewTable],
-) -> tuple[Problem, ...]:
+def check_texts(steps: Iterable[Step], sources: TextSources) -> tuple[Problem, ...]:
     """Build the program texts of steps, check them, and return warnings."""
     problems: list[Problem] = []
     warnings: list[Problem] = []
     seen: set[object] = set()
+    resources = sources.resources
     for step in steps:
         kinds = tuple((name, sampler_of(read, resources[read.resource])) for name, read in _sampled(step, resources))
         names = _uniform_kinds(step)
@@ -67,8 +62,8 @@ def check_texts(
             continue  # same text as another step
         seen.add(key)
         try:
-            whole = text_key(step, types, resources, views), names, _kept(step, resources)
-            warnings += _PASSED.get(whole, partial(_check_step, step, types, resources, views))
+            whole = text_key(step, sources), names, _kept(step, resources)
+            warnings += _PASSED.get(whole, partial(_check_step, step, sources))
         except InputError as error:
             problems += error.problems
     if problems:
@@ -76,11 +71,9 @@ def check_texts(
     return tuple(dict.fromkeys(warnings))
 
 
-def _check_step(
-    step: Step, types: Mapping[str, NodeType], resources: Mapping[str, Resource], views: Mapping[str, ViewTable]
-) -> tuple[Problem, ...]:
-    texts, cls = stage_texts(step, types, resources, views), types[step.node].cls
-    check_scene_includes(step, texts, types)
+def _check_step(step: Step, sources: TextSources) -> tuple[Problem, ...]:
+    texts, cls, resources = stage_texts(step, sources), sources.types[step.node].cls, sources.resources
+    check_scene_includes(step, texts, sources.types)
     check_kept_text(step, lambda: texts, cls, resources)
     _check_samplers(step, texts, resources)
     _check_outs(step, texts, cls, resources)

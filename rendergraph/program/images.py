@@ -45,8 +45,7 @@ def with_formats(
         if match["name"] not in images:
             if _is_compiled(source, macros, match):
                 place = origins[number].place(match.start("name") + 1)
-                unknown = step.problem("RG430", _unknown(step, match, images))
-                problems.append(replace(unknown, line_text=line, place=place))
+                problems.append(step.problem("RG430", _unknown(step, match, images)).relocate(place, line))
             continue
         use, desc = images[match["name"]]
         text = _mismatch(match, use, desc)

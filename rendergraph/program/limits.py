@@ -10,7 +10,7 @@ from rendergraph.errors import InputError, Problem, RenderError
 from rendergraph.expand import ViewTable
 from rendergraph.glsl.globals import declared_blocks, declared_samplers, globals_of
 from rendergraph.glsl.names import compiled_text, reachable_names
-from rendergraph.program.text import StepTexts
+from rendergraph.program.text import StepTexts, TextSources
 from rendergraph.program.variants import FIXED_BLOCKS, variants
 from rendergraph.scene.model import Scene
 from rendergraph.scene.pack import VIEW, PackedScene
@@ -46,7 +46,7 @@ def beyond_guaranteed(
 ) -> list[Problem]:
     """Return everything in a plan and its programs that some OpenGL 4.5 driver may not support."""
     problems = [*_samples(plan, GUARANTEED, _MINIMAL), *_excesses(GUARANTEED, plan, views, _MINIMAL)]
-    texts = StepTexts(types, plan.resources, views)
+    texts = StepTexts(TextSources(types, plan.resources, views))
     for step in plan.schedule.steps:
         for macros in variants(step, scene, packed, views, GUARANTEED["uniform_block"]) if step.shaders else ():
             stages = {stage: text.text for stage, text in texts.of(step, macros).items()}

@@ -10,12 +10,11 @@ from pathlib import Path
 
 from rendergraph.catalog import NodeType
 from rendergraph.errors import shown_file
-from rendergraph.expand import ViewTable
 from rendergraph.glsl.globals import Global, globals_of
 from rendergraph.glsl.names import declared, without_directives
 from rendergraph.glsl.source import Origin, SourceText
 from rendergraph.program.checks import sampler_of
-from rendergraph.program.text import StageText, prefix, read_defines, screen_reads, signatures_of
+from rendergraph.program.text import StageText, TextSources, prefix, read_defines, screen_reads, signatures_of
 from rendergraph.resources import folder
 from rendergraph.scene.pack import SLOTS
 from rendergraph.steps import Read, Resource, Step
@@ -42,17 +41,12 @@ class InScope:
 
 
 def in_scope(
-    step: Step,
-    types: Mapping[str, NodeType],
-    resources: Mapping[str, Resource],
-    views: Mapping[str, ViewTable],
-    defines: Mapping[str, str],
-    texts: Mapping[str, StageText],
+    step: Step, sources: TextSources, defines: Mapping[str, str], texts: Mapping[str, StageText]
 ) -> list[InScope]:
     """Return everything in scope in a step by section; `texts` is the result of `stage_texts`."""
-    found = _Scope(step, types, resources, texts)
+    found = _Scope(step, sources.types, sources.resources, texts)
     rows = [*found.textures(), *found.uniforms(), *found.blocks(), *found.functions(), *found.includes()]
-    rows += [*found.macros(read_defines(step.reads, resources, views), defines), *found.between(), *found.outputs()]
+    rows += [*found.macros(read_defines(step.reads, sources), defines), *found.between(), *found.outputs()]
     return sorted(rows, key=lambda row: SECTIONS.index(row.section))
 
 

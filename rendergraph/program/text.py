@@ -64,11 +64,17 @@ def prefix(node: str) -> str:
     return ("Z" if plain == "gl" or plain[0].isdigit() else "") + plain + "_"
 
 
+class TextSources(Struct, frozen=True, eq=False):
+    """What the program texts of a graph's steps are made from: node types by node id, resources and view tables."""
+
+    types: Mapping[str, NodeType]
+    resources: Mapping[str, Resource]
+    views: Mapping[str, ViewTable]
+
+
 def stage_texts(
     step: Step,
-    types: Mapping[str, NodeType],
-    resources: Mapping[str, Resource],
-    views: Mapping[str, ViewTable],
+    sources: TextSources,
     *,
     defines: Mapping[str, str] | None = None,
     include_folder: Path | None = None,
@@ -86,10 +92,10 @@ def stage_texts(
     shaders = dict(step.shaders)
     if step.kind == "fullscreen":
         shaders.setdefault("vertex", "<fullscreen.vert>")
-    macros = {**read_defines(step.reads, resources, views), **dict(step.defines), **(defines or {})}
+    macros = {**read_defines(step.reads, sources), **dict(step.defines), **(defines or {})}
     if step.kind != "compute":
         macros = {**_sample_macros("PASS", step.samples), **macros}
-    program = _Program(step, types, resources, views, macros)
+    program = _Program(step, sources, macros)
     texts: dict[str, StageText] = {}
     for stage in ("vertex", "geometry", "fragment", "compute"):
         if stage in shaders:
@@ -107,20 +113,18 @@ _IRRELEVANT: dict[str, Any] = {
 """Fields of a step that do not affect its texts, or only through `text_key`."""
 
 
-def text_key(
-    step: Step, types: Mapping[str, NodeType], resources: Mapping[str, Resource], views: Mapping[str, ViewTable]
-) -> Hashable:
+def text_key(step: Step, sources: TextSources) -> Hashable:
     """Return everything that a step's texts depend on except files: equal keys give equal texts, even in two graphs."""
 
     def seen(use: Read | Write) -> Hashable:
-        resource = resources[use.resource]
-        count = resource.view and views.get(resource.view, ViewTable()).count
+        resource = sources.resources[use.resource]
+        count = resource.view and sources.views.get(resource.view, ViewTable()).count
         desc = resource.desc  # texts do not contain sizes, which `textureSize` and `imageSize` return
         what = (desc.kind, desc.format, desc.layers, desc.samples) if isinstance(desc, TextureDesc) else desc
         return replace(use, resource="", version=0, mip=None), what, resource.lights, count
 
     def made_of(node: str) -> Hashable:
-        type = types[node]
+        type = sources.types[node]
         return type.cls, type.file, type.shaders, type.inherited
 
     def provided(each: FunctionBinding) -> Hashable:
@@ -138,15 +142,12 @@ class StepTexts(Struct, eq=False):
     They are cached across pipelines, as long as their files do not change.
     """
 
-    types: Mapping[str, NodeType]
-    resources: Mapping[str, Resource]
-    views: Mapping[str, ViewTable]
+    sources: TextSources
     _links: Links = field(default_factory=Links)
 
     def of(self, step: Step, defines: Mapping[str, str]) -> dict[str, StageText]:
-        key = text_key(step, self.types, self.resources, self.views), tuple(defines.items())
-        args = step, self.types, self.resources, self.views
-        texts = _TEXTS.get(key, lambda: stage_texts(*args, defines=defines, links=self._links))
+        key = text_key(step, self.sources), tuple(defines.items())
+        texts = _TEXTS.get(key, lambda: stage_texts(step, self.sources, defines=defines, links=self._links))
         return {stage: replace(text, node=step.node) for stage, text in texts.items()}
 
 
@@ -154,16 +155,14 @@ class _Program(Struct, frozen=True):
     """A step with everything that its program text depends on, as in `stage_texts`."""
 
     step: Step
-    types: Mapping[str, NodeType]
-    resources: Mapping[str, Resource]
-    views: Mapping[str, ViewTable]
+    sources: TextSources
     macros: Mapping[str, str]
 
     def stage(self, stage: str, name: str, includes: Includes) -> StageText:
         include_folder = includes.include_folder
         view = includes.expand(include_folder / "view.glsl")
         view = SourceText(tuple(SourceBlock(block.lines, replace(block.origin, shared=True)) for block in view.blocks))
-        step, node = self.step, self.types[self.step.node]
+        step, node = self.step, self.sources.types[self.step.node]
         file, root = node.shader_file(name, include_folder)
         # The calls in the file decide which functions precede it, so it is expanded without them first.
         versions = node.is_shader and not name.startswith("<")
@@ -174,7 +173,7 @@ class _Program(Struct, frozen=True):
 
         source = expanded(includes.copy())
         functions = SourceText()
-        for signature in signatures_of(step, self.types).values():
+        for signature in signatures_of(step, self.sources.types).values():
             if any(calls(source.text, one.name) for one in signature.functions):
                 functions += self._functions(stage, signature, includes)
             if mentions(source.text, f"{signature.name.upper()}_LIGHT_COUNT"):
@@ -186,10 +185,10 @@ class _Program(Struct, frozen=True):
         if any(use.use == "image" for use in uses) or _IMAGE_TYPE.search(source.text):
             from rendergraph.program.images import with_formats  # many pipelines have no images
 
-            source = with_formats(source, step, self.resources, self.macros)
+            source = with_formats(source, step, self.sources.resources, self.macros)
         extensions, source = _hoisted(source)
         body = functions.text + source.text
-        declarations = self._elements(body) + _read_declarations(step.reads, self.resources, "", body)
+        declarations = self._elements(body) + _read_declarations(step.reads, self.sources.resources, "", body)
         text = view + declarations + functions + source
         aliases, warnings = find_old_names(text, include_folder)
         head = generated([VERSION, *extensions]) + _macro_text({**aliases, **_used_macros(self.macros, text.text)})
@@ -198,7 +197,7 @@ class _Program(Struct, frozen=True):
     def _elements(self, body: str) -> SourceText:
         """Return the element structs of the step's buffers that the text names."""
         uses: tuple[Read | Write, ...] = (*self.step.all_reads, *self.step.writes)
-        found = [getattr(self.resources[use.resource].desc, "element", None) for use in uses]
+        found = [getattr(self.sources.resources[use.resource].desc, "element", None) for use in uses]
         structs = [each.glsl for each in dict.fromkeys(found) if each is not None and mentions(body, each.name)]
         return generated(structs, "the elements of the step's buffers") if structs else SourceText()
 
@@ -220,7 +219,7 @@ class _Program(Struct, frozen=True):
         join = f"result = result {signature.combine}"
         factors = [f"{join} {prefix(node)}{signature.name}({arguments});" for node in nodes]
         if stage == "fragment":
-            for read in screen_reads(signature, self.step, self.types[self.step.node]):
+            for read in screen_reads(signature, self.step, self.sources.types[self.step.node]):
                 lines.append(f"uniform sampler2DArray {read.name};")
                 factors += _screen_factors(read, self._lights(read), signature)
         kind = signature.declaration.split()[0]
@@ -231,18 +230,18 @@ class _Program(Struct, frozen=True):
     def _light_table(self, signature: Signature) -> Iterator[str]:
         """Yield the lights that any provider or texture of the function knows, for shaders that need them."""
         reads = [read for one in self.step.functions if one.signature == signature.name for read in one.reads]
-        reads += screen_reads(signature, self.step, self.types[self.step.node])
+        reads += screen_reads(signature, self.step, self.sources.types[self.step.node])
         known = list(dict.fromkeys(light for read in reads for light in self._lights(read)))
         yield f"#define {signature.name.upper()}_LIGHT_COUNT {len(known)}"
         if known:
             yield f"const int {signature.name}_lights[{len(known)}] = int[]({', '.join(map(str, known))});"
 
     def _lights(self, read: Read) -> tuple[int, ...]:
-        return self.resources[read.resource].lights if read.resource in self.resources else ()
+        return self.sources.resources[read.resource].lights if read.resource in self.sources.resources else ()
 
     def _provider_text(self, binding: FunctionBinding, includes: Includes) -> SourceText:
         """Return one provider's text with a prefix on every name that it declares, its inputs and its parameters."""
-        before, node = prefix(binding.node), self.types[binding.node]
+        before, node = prefix(binding.node), self.sources.types[binding.node]
         file, root = node.shader_file(binding.shader)
         plugged = dict(binding.includes)
         source = includes.expand(file, root=root, prefix=before, plugged=plugged, inherited=node.inherited)
@@ -252,7 +251,7 @@ class _Program(Struct, frozen=True):
             if each.name not in names:
                 text = f"{node_named(binding.node, node.name)}: '{binding.shader}' does not define '{each.declaration}'"
                 raise InputError(Problem("RG408", text, Origin(file, 1).place()))
-        macros = {**read_defines(binding.reads, self.resources, self.views), **dict(binding.defines)}
+        macros = {**read_defines(binding.reads, self.sources), **dict(binding.defines)}
         names |= {*macros, *(name for name, _ in binding.uniforms), *node.cls.parameters()}
         endings = ("_LAYERS", "_SAMPLES", "_SAMPLE_POSITIONS", "_COUNT", "_VIEW_COUNT")
         for port in (*node.cls.ports(), *(read.name for read in binding.reads)):
@@ -266,7 +265,7 @@ class _Program(Struct, frozen=True):
         blocks = (b if b.origin.shared else replace(b, lines=tuple(islice(lines, len(b.lines)))) for b in source.blocks)
         final = SourceText(tuple(blocks))
         head = _macro_text({before + key: renamed(value, rename) for key, value in macros.items()})
-        return head + _read_declarations(binding.reads, self.resources, before, final.text) + final
+        return head + _read_declarations(binding.reads, self.sources.resources, before, final.text) + final
 
 
 def _hoisted(source: SourceText) -> tuple[list[str], SourceText]:
@@ -339,21 +338,19 @@ def _screen_factors(read: Read, lights: tuple[int, ...], signature: Signature) -
     ]
 
 
-def read_defines(
-    reads: Iterable[Read], resources: Mapping[str, Resource], views: Mapping[str, ViewTable]
-) -> dict[str, str]:
+def read_defines(reads: Iterable[Read], sources: TextSources) -> dict[str, str]:
     """Return `<X>_LAYERS`, `<X>_SAMPLES`, `<X>_VIEW_COUNT` of textures read, `<X>_COUNT` of lists of inputs."""
     macros: dict[str, str] = {}
     counts: dict[str, int] = {}
     for read in reads:
-        resource = resources.get(read.resource)
+        resource = sources.resources.get(read.resource)
         if resource is None or not isinstance(resource.desc, TextureDesc) or read.use == "attach":
             continue
         name = read.name.upper()
         macros[f"{name}_LAYERS"] = str(resource.desc.layers)
         macros |= _sample_macros(name, resource.desc.samples)
         if resource.view is not None:
-            macros[f"{name}_VIEW_COUNT"] = str(views.get(resource.view, ViewTable()).count)
+            macros[f"{name}_VIEW_COUNT"] = str(sources.views.get(resource.view, ViewTable()).count)
         if match := re.match(r"(.+)_(\d+)\Z", name):
             counts[match[1]] = max(counts.get(match[1], 0), int(match[2]) + 1)
     return {f"{name}_COUNT": str(count) for name, count in counts.items()} | macros

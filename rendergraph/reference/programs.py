@@ -121,7 +121,7 @@ def _steps_with_program(linked: Linked, node: str) -> tuple[Expansion, list[Step
 
 
 def _describe(linked: Linked, expansion: Expansion, steps: list[Step], step: Step) -> dict[str, Any]:
-    from rendergraph.program import stage_texts  # most topics need no GLSL
+    from rendergraph.program import TextSources, stage_texts  # most topics need no GLSL
     from rendergraph.program.scope import annotated, in_scope  # likewise
     from rendergraph.program.variants import variants  # likewise
     from rendergraph.scene.pack import pack  # likewise
@@ -129,8 +129,9 @@ def _describe(linked: Linked, expansion: Expansion, steps: list[Step], step: Ste
     types = {one.id: one.type for one in linked.graph.nodes}
     found = variants(step, linked.scene, pack(linked.scene), expansion.views)
     macros = (found or [{}])[0]
-    texts = stage_texts(step, types, expansion.resources, expansion.views, defines=macros)
-    scope = in_scope(step, types, expansion.resources, expansion.views, macros, texts)
+    sources = TextSources(types, expansion.resources, expansion.views)
+    texts = stage_texts(step, sources, defines=macros)
+    scope = in_scope(step, sources, macros, texts)
     return {
         "pipeline": linked.graph.name,
         "node": step.node,

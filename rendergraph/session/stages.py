@@ -194,11 +194,11 @@ def plan(expanded: Expanded) -> Planned:
 
 def check(linked: Linked) -> Planned:
     """Find every mistake that can be found without GL, for all outputs of the file."""
-    from rendergraph.program import check_texts, ray_warnings
+    from rendergraph.program import TextSources, check_texts, ray_warnings
 
     planned = plan(expand(linked))
     steps, types = planned.plan.schedule.steps, linked.node_types
-    warnings = check_texts(steps, types, planned.plan.resources, planned.expansion.views)
+    warnings = check_texts(steps, TextSources(types, planned.plan.resources, planned.expansion.views))
     return replace(planned, warnings=(*warnings, *ray_warnings(steps, types)))
 
 

@@ -14,7 +14,7 @@ from rendergraph.catalog import NodeType
 from rendergraph.errors import Problem
 from rendergraph.expand import ViewTable
 from rendergraph.glsl import strip_comments
-from rendergraph.program import StageText, stage_texts
+from rendergraph.program import StageText, TextSources, stage_texts
 from rendergraph.program.messages import compile_problems, link_problems
 from rendergraph.steps import FunctionBinding, Read, Resource, Step
 from rendergraph.textures import TextureDesc
@@ -79,7 +79,7 @@ def texts(folder: Path, shader: str) -> dict[str, StageText]:
     functions = (FunctionBinding("shadow", "sun", "shadow.glsl", (Read("shadow_map", "sun.map", 1),)),)
     reads = (Read("depth", "z.depth", 1),)
     step = Step("a", 0, "fullscreen", (("fragment", shader),), reads, functions=functions, defines=(("SAMPLES", "4"),))
-    return stage_texts(step, types, resources, {"camera": ViewTable()})
+    return stage_texts(step, TextSources(types, resources, {"camera": ViewTable()}))
 
 
 def answer(form: str, text: StageText, fragment: str, name: str) -> Problem:

@@ -13,7 +13,7 @@ import pytest
 
 import rendergraph as rg
 from rendergraph.cli.app import main
-from rendergraph.program import positions_macro, stage_texts
+from rendergraph.program import TextSources, positions_macro, stage_texts
 from rendergraph.program.scope import annotated
 from rendergraph.program.variants import variants
 from rendergraph.resources import shipped_pipelines
@@ -37,7 +37,7 @@ def programs(pipeline: rg.Pipeline) -> Iterator[dict[str, str]]:
     types, packed = {node.id: node.type for node in expanded.linked.graph.nodes}, pack(scene)
     for step in made.steps:
         for macros in variants(step, scene, packed, made.views) if step.shaders else ():
-            texts = stage_texts(step, types, made.resources, made.views, defines=macros)
+            texts = stage_texts(step, TextSources(types, made.resources, made.views), defines=macros)
             final = {stage: annotated(text) for stage, text in texts.items()}
             for count in (2, 4, 8, 16):
                 macro, places = positions_macro(count) + "\n", f"vec2[]({', '.join(['vec2(0.5)'] * count)})\n"

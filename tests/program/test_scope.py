@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 import rendergraph as rg
-from rendergraph.program import StageText, stage_texts
+from rendergraph.program import StageText, TextSources, stage_texts
 from rendergraph.program.scope import InScope, annotated, in_scope
 from rendergraph.program.variants import variants
 from rendergraph.scene.pack import pack
@@ -22,10 +22,11 @@ def programs(pipeline: rg.Pipeline) -> Iterator[tuple[Step, dict[str, str], dict
     expanded = pipeline.expand()
     scene, made = expanded.linked.scene, expanded.expansion
     types, packed = {node.id: node.type for node in expanded.linked.graph.nodes}, pack(scene)
+    sources = TextSources(types, made.resources, made.views)
     for step in made.steps:
         for macros in variants(step, scene, packed, made.views) if step.kind in PROGRAMS else ():
-            texts = stage_texts(step, types, made.resources, made.views, defines=macros)
-            yield step, macros, texts, in_scope(step, types, made.resources, made.views, macros, texts)
+            texts = stage_texts(step, sources, defines=macros)
+            yield step, macros, texts, in_scope(step, sources, macros, texts)
 
 
 def scope_of(pipeline: rg.Pipeline, node: str) -> dict[str, str]:

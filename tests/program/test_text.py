@@ -15,7 +15,7 @@ from rendergraph.catalog import NodeType
 from rendergraph.errors import InputError
 from rendergraph.expand import ViewTable
 from rendergraph.glsl.source import Origin, SourceText
-from rendergraph.program import StageText, StepTexts, prefix, stage_texts
+from rendergraph.program import StageText, StepTexts, TextSources, prefix, stage_texts
 from rendergraph.program.messages import compile_problems, link_problems
 from rendergraph.resources import folder as folder_of
 from rendergraph.steps import FunctionBinding, Read, Resource, Step
@@ -110,7 +110,8 @@ def step(*providers: str, shader: str = "light.frag", visibility: bool = False) 
 
 
 def fragment(folder: Path, given: Step) -> StageText:
-    return stage_texts(given, types(folder), RESOURCES, VIEWS, include_folder=folder.parent / "include")["fragment"]
+    sources = TextSources(types(folder), RESOURCES, VIEWS)
+    return stage_texts(given, sources, include_folder=folder.parent / "include")["fragment"]
 
 
 @pytest.fixture
@@ -140,7 +141,7 @@ def test_texts_of_equal_steps_are_put_together_once_and_of_others_not(
         "wide": replace(RESOURCES["vis"], id="wide", desc=TextureDesc("texture2d_array", "r16", 8, 8, layers=5)),
         "lit": replace(RESOURCES["vis"], id="lit", lights=(0, 3)),
     }
-    texts = StepTexts(types(folder) | {"other": types(folder)["light"]}, resources, VIEWS)
+    texts = StepTexts(TextSources(types(folder) | {"other": types(folder)["light"]}, resources, VIEWS))
     base = step("sun-soft", visibility=True)
     first = texts.of(base, {"A": "1"})
     again = texts.of(replace(base, node="other", index=3, reads=(Read("visibility_0", "same", 2),)), {"A": "1"})
@@ -160,11 +161,11 @@ def test_texts_of_equal_steps_are_put_together_once_and_of_others_not(
         assert len(made) == before + 1
 
     before = len(made)
-    another: dict[str, Any] = {"types": types(folder), "resources": resources, "views": VIEWS}
-    assert StepTexts(**another).of(base, {"A": "1"})["fragment"].text == first["fragment"].text
+    another = TextSources(types(folder), resources, VIEWS)
+    assert StepTexts(another).of(base, {"A": "1"})["fragment"].text == first["fragment"].text
     assert len(made) == before  # another pipeline's step, as long as the files are what they were
     (folder / "kernel.glsl").write_text("const float WIDTH = 7.25;\nfloat kernel(float s) { return s * WIDTH; }\n")
-    assert "7.25" in StepTexts(**another).of(base, {"A": "1"})["fragment"].text
+    assert "7.25" in StepTexts(another).of(base, {"A": "1"})["fragment"].text
     assert len(made) == before + 1
 
 
@@ -300,7 +301,8 @@ def test_warnings_are_left_out_where_there_are_errors(folder: Path) -> None:
 
 
 def test_link_messages_name_the_stages(folder: Path) -> None:
-    texts = stage_texts(step(), types(folder), RESOURCES, VIEWS, include_folder=folder.parent / "include")
+    sources = TextSources(types(folder), RESOURCES, VIEWS)
+    texts = stage_texts(step(), sources, include_folder=folder.parent / "include")
     (found,) = link_problems("error: fragment shader input `v_x' has no matching output\n", texts)
     assert found.code == "RG411"
     assert found.text.startswith("node 'light': the stages vertex, fragment do not link: fragment shader input")
