@@ -108,24 +108,22 @@ def package(plugin: str, package: str) -> Iterator[tuple[str, Listed]]:
 def _modules(folder: Path, package: str, plugin: str, shaders: Path | None) -> list[tuple[str, Listed]]:
     found: list[tuple[str, Listed]] = []
     files = list(_files(folder))
-    has_python = any(suffix == ".py" for _, _, _, suffix in files)
-    for where, family, stem, suffix in files:
-        file = os.path.join(where, stem + suffix)
-        if suffix == ".py":
-            module = ".".join([package, *filter(None, family.split("/")), stem])
-            beside = Path(where) if shaders is None else shaders / family
-            found.append((stem, Listed(module, family, Path(file), beside, plugin)))
+    has_python = any(file.suffix == ".py" for file, _ in files)
+    for file, family in files:
+        if file.suffix == ".py":
+            module = ".".join([package, *filter(None, family.split("/")), file.stem])
+            beside = file.parent if shaders is None else shaders / family
+            found.append((file.stem, Listed(module, family, file, beside, plugin)))
         elif not has_python or _has_header(file):
-            found.append((stem, Listed("", family, Path(file), Path(where), plugin)))
-    for where, family, stem, suffix in _files(shaders) if shaders is not None else ():
-        file = os.path.join(where, stem + suffix)
-        if suffix in SHADERS and _has_header(file):
-            found.append((stem, Listed("", family, Path(file), Path(where), plugin)))
+            found.append((file.stem, Listed("", family, file, file.parent, plugin)))
+    for file, family in _files(shaders) if shaders is not None else ():
+        if file.suffix in SHADERS and _has_header(file):
+            found.append((file.stem, Listed("", family, file, file.parent, plugin)))
     return found
 
 
-def _files(folder: Path, most: float = math.inf) -> Iterator[tuple[str, str, str, str]]:
-    """Yield folder, family, stem and extension of files that may be node types; ValueError for more than `most`."""
+def _files(folder: Path, most: float = math.inf) -> Iterator[tuple[Path, str]]:
+    """Yield files that may be node types, with their families; ValueError for more than `most`."""
     seen, top = 0, os.fspath(folder)
     for where, subfolders, files in os.walk(top):
         record_read(where)
@@ -138,15 +136,15 @@ def _files(folder: Path, most: float = math.inf) -> Iterator[tuple[str, str, str
             stem, suffix = os.path.splitext(file)
             is_module = suffix == ".py" and not _NO_NODE.match(stem) and (family, stem) != ("", MODULE)
             if is_module or (suffix in SHADERS and _STEM.match(stem)):
-                yield where, family, stem, suffix
+                yield Path(where, file), family
 
 
-def _has_header(file: str) -> bool:
+def _has_header(file: Path) -> bool:
     record_read(file)
-    if not os.path.isfile(file):  # opening a pipe would block
+    if not file.is_file():  # opening a pipe would block
         return False
     try:
-        with open(file, "rb") as opened:
+        with file.open("rb") as opened:
             text = opened.read(_HEAD_BYTES)
     except OSError:
         return False
@@ -156,11 +154,11 @@ def _has_header(file: str) -> bool:
 def shaders(folder: Path, most_files: int = MOST_FILES) -> tuple[list[tuple[str, Listed]], list[Path]]:
     """Return the shader nodes of a folder that a pipeline file names, and the Python files there, which are not run."""
     files = list(_files(folder, most_files))
-    python = [Path(where, stem + suffix) for where, _, stem, suffix in files if suffix == ".py"]
+    python = [file for file, _ in files if file.suffix == ".py"]
     found = [
-        (stem, Listed("", family, Path(file), Path(where), folder.name))
-        for where, family, stem, suffix in files
-        if suffix in SHADERS and (file := os.path.join(where, stem + suffix)) and (not python or _has_header(file))
+        (file.stem, Listed("", family, file, file.parent, folder.name))
+        for file, family in files
+        if file.suffix in SHADERS and (not python or _has_header(file))
     ]
     return found, python
 

@@ -352,10 +352,7 @@ class Extensions:
 
     def metrics(self) -> list[Added[Metric]]:
         """Return the metrics of pictures; two with the same name are an error."""
-        found = self.added("metrics")
-        for metric in found:
-            _one("metric", metric.name, found)
-        return found
+        return self._unambiguous("metrics")
 
     def scene_keys(self, section: Section) -> list[Added[SceneKey]]:
         """Return the keys of the entries in a section of scene files."""
@@ -364,12 +361,8 @@ class Extensions:
 
     def textures(self) -> dict[str, TextureKind]:
         """Return the kinds of generated textures with absolute shader paths; two with the same name are an error."""
-        added = self.added("textures")
-        return {
-            one.name: replace(one.value, shader=one.file.parent / one.value.shader)
-            for one in added
-            if _one("kind of texture", one.name, added)
-        }
+        added = self._unambiguous("textures")
+        return {one.name: replace(one.value, shader=one.file.parent / one.value.shader) for one in added}
 
     def scene_key(self, section: Section, name: str) -> Added[SceneKey] | None:
         """Return a key by name; two plugins with the same name are an error."""
@@ -392,6 +385,10 @@ class Extensions:
             for source, extension in self._usable()
             for name, value in getattr(extension, field).items()
         ]
+
+    def _unambiguous(self, field: str) -> list[Added[Any]]:
+        added = self.added(field)
+        return [one for one in added if _one(_KINDS[field], one.name, added)]
 
     def _usable(self) -> Iterator[tuple[Source, Extension]]:
         return ((source, source.extension) for source in self.sources if source.extension is not None)

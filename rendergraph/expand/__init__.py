@@ -64,15 +64,11 @@ def _shown(found: VersionAssignment, name: str, end: Endpoint) -> str:
     copy = f"{end} kept"
     if copy not in found.resources:
         found.resources[copy] = replace(found.resources[resource], id=copy, role="output")
-        found.steps.append(_copy(name, end, resource, version, found.steps))
+        index = 1 + max(step.index for step in found.steps if step.node == end.node)
+        read, write = Read("source", resource, version, "image"), Write("copy", copy, 1, "image")
+        label = f"copy of {end}, kept for {'tap' if '.' in name else 'output'} '{name}'"
+        found.steps.append(Step(end.node, index, "copy", reads=(read,), writes=(write,), label=label))
     return copy
-
-
-def _copy(name: str, end: Endpoint, resource: str, version: int, steps: list[Step]) -> Step:
-    index = 1 + max(step.index for step in steps if step.node == end.node)
-    read, write = Read("source", resource, version, "image"), Write("copy", f"{end} kept", 1, "image")
-    label = f"copy of {end}, kept for {'tap' if '.' in name else 'output'} '{name}'"
-    return Step(end.node, index, "copy", reads=(read,), writes=(write,), label=label)
 
 
 def _mark_roles(found: VersionAssignment, shown: set[str]) -> None:
