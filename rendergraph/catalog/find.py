@@ -24,7 +24,7 @@ from rendergraph.catalog.types import PREFIX, SHADERS, Listed, fresh_package, sh
 from rendergraph.declare.blame import describe_error, source_location
 from rendergraph.declare.extensions import Extension, Extensions, Source, extension_mistakes
 from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
-from rendergraph.installed import EntryPoint, module_spec, plain
+from rendergraph.installed import EntryPoint, Package, module_spec, plain
 from rendergraph.settings import expand_home, nearest_settings
 from rendergraph.stamps import FileCache, record_read
 
@@ -212,11 +212,8 @@ def _sources(folders: Iterable[Path], offered: Iterable[EntryPoint]) -> Iterator
         file = folder / f"{MODULE}.py"
         record_read(file)
         if file.is_file():
-            yield _source(folder.name, file, _loader(f"{package_of(folder)}.{MODULE}"), f"{MODULE}.py:{NAME}")
-
-
-def _loader(module: str) -> Callable[[], Any]:
-    return lambda: getattr(importlib.import_module(module), NAME)
+            entry = EntryPoint(EXTENSIONS, NAME, f"{package_of(folder)}.{MODULE}:{NAME}", Package(str(folder)))
+            yield _source(folder.name, file, entry.load, f"{MODULE}.py:{NAME}")
 
 
 def _file(entry: EntryPoint) -> Path:

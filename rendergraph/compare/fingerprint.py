@@ -124,9 +124,8 @@ def _module_digests(name: str, seen: set[str]) -> Iterator[str]:
 
 def _spec(name: str) -> ModuleSpec | None:
     """Return where a module comes from, whether or not it has been imported: another process may have done so."""
-    if (module := sys.modules.get(name)) is not None:
-        return module.__spec__
-    return module_spec(name)  # None if the name is that of something within a module
+    module = sys.modules.get(name)  # the name may also be that of something within a module, which has no spec
+    return module_spec(name) if module is None else module.__spec__
 
 
 def _imported_names(file: Path, package: str) -> list[str]:

@@ -211,14 +211,12 @@ READ_IMAGES = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga")
 """Endings of image files that need no plugin."""
 _READ_SCENES = (".yaml", ".yml", ".obj", ".gltf", ".glb", ".npz", ".usd", ".usda", ".usdc", ".usdz")
 _TAKEN = {
-    "meshes": (_READ_SCENES, "meshes has '{}', which rendergraph reads itself"),
-    "scenes": (_READ_SCENES, "scenes has '{}', which rendergraph reads itself"),
-    "images": (READ_IMAGES, "images has '{}', which rendergraph reads itself"),
-    "metrics": (
-        ("flip", "rmse", "psnr", "ssim", "radiance_rmse"),
-        "metric '{}' is one of rendergraph's own; choose another name",
-    ),
+    "meshes": _READ_SCENES,
+    "scenes": _READ_SCENES,
+    "images": READ_IMAGES,
+    "metrics": ("flip", "rmse", "psnr", "ssim", "radiance_rmse"),
 }
+"""Names of rendergraph's own, by the field in which a plugin might use them."""
 
 
 def extension_mistakes(extension: Extension, folder: Path) -> list[Problem]:
@@ -233,8 +231,10 @@ def _mistakes(extension: Extension, folder: Path) -> Iterator[tuple[str, str]]:
         for name, include in choices.items():
             if not (folder / include).is_file():
                 yield "choices", f"choices['{parameter}']['{name}']: there is no file '{include}' beside the extension"
-    for field, (taken, text) in _TAKEN.items():
-        yield from ((field, text.format(name)) for name in getattr(extension, field) if name in taken)
+    for field, taken in _TAKEN.items():
+        for name in [name for name in getattr(extension, field) if name in taken]:
+            own_metric = f"metric '{name}' is one of rendergraph's own; choose another name"
+            yield field, own_metric if field == "metrics" else f"{field} has '{name}', which rendergraph reads itself"
     for name, kind in extension.textures.items():
         wrong = kind.mistake() or ("" if (folder / kind.shader).is_file() else f"has no file '{kind.shader}' beside it")
         if wrong:
