@@ -209,9 +209,6 @@ def _light(gpu: Gpu, planned: Planned, run: Run, frames: int = 1) -> Pixels:
     return np.asarray(total / frames)
 
 
-# --- the cache on the disk -------------------------------------------------------------------------------------------
-
-
 def _load(key: str) -> Truth | None:
     """Return the cached truth; None if there is none or it cannot be read."""
     if (stored := _CACHE.get(key)) is None:

@@ -25,8 +25,7 @@ class DiskCache:
     """
 
     def __init__(self, name: str, most_bytes: int) -> None:
-        self.name = name
-        self.most_bytes = most_bytes
+        self.name, self.most_bytes = name, most_bytes
 
     def _file(self, key: str) -> Path:
         named = os.environ.get("RENDERGRAPH_CACHE")
@@ -39,12 +38,11 @@ class DiskCache:
         """Return the arrays of a key; None if there are none or they cannot be read."""
         file = self._file(key)
         try:
-            with np.load(io.BytesIO(file.read_bytes()), allow_pickle=False) as stored:
-                arrays = dict(stored)
             os.utime(file)
+            with np.load(io.BytesIO(file.read_bytes()), allow_pickle=False) as stored:
+                return dict(stored)
         except (OSError, ValueError, KeyError, EOFError, BadZipFile):
             return None
-        return arrays
 
     def put(self, key: str, arrays: Mapping[str, Any]) -> None:
         data, file = io.BytesIO(), self._file(key)

@@ -368,7 +368,8 @@ class _Reader:
     def _object(self, name: str, entry: Value) -> None:
         self._check_name(entry.get("material"), "materials")
         values = self._plain("objects", entry)
-        for choice in _listed(entry.get("repeat", "choose", "material")):
+        choices = entry.get("repeat", "choose", "material")
+        for choice in choices.data if choices is not None and isinstance(choices.data, list) else ():
             self._check_name(choice, "materials")
         copied = self._copies("objects", name, entry, values)
         keys = ["extra", *(key.name for key in scene_keys.OBJECT.keys)]
@@ -624,7 +625,3 @@ def _kinds(root: Value) -> set[str]:
 def _entries(value: Value, section: str) -> dict[str, Value]:
     entries = value.get(section)
     return dict(entries.items()) if entries is not None else {}
-
-
-def _listed(value: Value | None) -> list[Value]:
-    return value.data if value is not None and isinstance(value.data, list) else []

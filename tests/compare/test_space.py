@@ -410,5 +410,7 @@ def test_what_cannot_go_together_is_told_at_its_line(tmp_path: Path) -> None:
     file = read_sweep(path)
     with pytest.raises(InputError) as caught:
         file.space.check()
-    told = [str(problem).splitlines()[0].removeprefix(f"{path}:") for problem in file.placed(caught.value).problems]
+    told = [
+        str(problem).splitlines()[0].removeprefix(f"{path}:") for problem in map(file.relocate, caught.value.problems)
+    ]
     assert [line.partition(" RG524")[0] for line in told] == ["5:5:", "3:30:"]
