@@ -31,10 +31,9 @@ lint:
 	ruff format --check .
 	ruff check .
 
-# mypy reads everything; pyright, which editors use, what authors of nodes and scripts import, and in `make nightly` the rest.
+# mypy reads everything; `make nightly` asks pyright as well, which editors use.
 types:
 	mypy
-	pyright nodes rendergraph/__init__.py rendergraph/api rendergraph/session
 
 imports:
 	lint-imports

@@ -124,10 +124,10 @@ class FakeFrame:
 @pytest.fixture
 def fake(monkeypatch: pytest.MonkeyPatch) -> FakeStages:
     """What `run` goes through in this test."""
-    from rendergraph.session import gpu, outputs, stages
+    from rendergraph.session import gpu, stages, values
 
     made = FakeStages()
-    monkeypatch.setattr(outputs, "figures", lambda graph: made.figures)
+    monkeypatch.setattr(values, "figures", lambda graph: made.figures)
     for name in ("resolve", "link", "expand", "draw"):
         monkeypatch.setattr(stages, name, getattr(made, name))
     monkeypatch.setattr(gpu, "Gpu", made.gpu)

@@ -48,7 +48,7 @@ def marks_of(verb: str) -> list[pytest.MarkDecorator]:
     return [pytest.mark.nightly] if verb in LONGER else [pytest.mark.slow] if verb in LONG else []
 
 
-@pytest.mark.nightly(keep=8)
+@pytest.mark.nightly(keep=4)
 @pytest.mark.parametrize("verb", ["", *(pytest.param(v, marks=marks_of(v)) for v in VERBS)])
 def test_the_examples_of_the_help_work(cli: Any, tmp_path: Path, verb: str) -> None:
     if verb == "config":

@@ -155,8 +155,8 @@ def test_random_graphs_under_edits(
     assert left_out > 0 or len({edit[1] for edit in edits}) > 1  # an edit that changes nothing runs nothing
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
-@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize(
     ("name", "values"),
     [

@@ -12,7 +12,7 @@ import rendergraph as rg
 SIZE = (80, 45)
 
 
-@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("without", "least"),

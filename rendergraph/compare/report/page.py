@@ -95,7 +95,7 @@ def _search(search: Search) -> str:
     words = f"{'The least' if one else 'The front of the least'} {what} of {len(search.order)} runs."
     steps = ", ".join(f"{_value(value)} after {place}" for place, value in search.improvements())
     words += f" The best <code>{escape(search.minimise[0])}</code> was {steps}." if steps else ""
-    heads = ["", *(f"#{escape(name)}" for name in search.minimise)]
+    heads = ["", *(f"#{name}" for name in search.minimise)]
     return table(heads, rows, "Best runs of the search") + f"<p class=quiet>{words}</p>"
 
 
@@ -146,7 +146,7 @@ def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
         ("SSIM", lambda r: _cell(number(r.metrics.ssim))),
     ]
     for name in dict.fromkeys(name for result in results for name in result.columns):
-        columns.append((escape(name), partial(lambda name, r: _cell(number(r.columns.get(name))), name)))
+        columns.append((name, partial(lambda name, r: _cell(number(r.columns.get(name))), name)))
     if any(result.radiance_rmse is not None for result in results):
         columns.append(("light RMSE", lambda r: _cell(number(r.radiance_rmse))))
         columns.append(("rel. MSE", lambda r: _cell(number(r.relative_mse))))
