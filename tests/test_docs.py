@@ -24,6 +24,8 @@ import yaml
 
 import rendergraph as rg
 from rendergraph.cli.app import VERBS, group, main
+from rendergraph.compare import truth
+from rendergraph.images.cache import DiskCache
 from rendergraph.link import endpoint
 from rendergraph.resources import shipped_pipelines
 
@@ -123,6 +125,7 @@ def test_blocks_of_a_page(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("RENDERGRAPH_TRACEBACK", "1")
+    monkeypatch.setattr(truth, "_CACHE", DiskCache(str(tmp_path / "truths"), 1 << 30))  # not that of another page
     for block in blocks(page):
         where = f"{page.name}:{block.line}"
         if block.file:
