@@ -39,9 +39,8 @@ from rendergraph.api import Any as AnyTexel
 PIPELINE = "nodes:\n  a: {type: wrong}\noutputs: {image: a.color}\n"
 WHITE = "out vec4 color;\nvoid main() { color = vec4(1.0); }\n"
 
-os.environ.setdefault(
-    "RENDERGRAPH_CACHE", str(Path(__file__).parents[1] / ".cache" / "rendergraph")
-)  # shared by all processes
+# All processes of the tests share one cache, which is not the user's.
+os.environ.setdefault("RENDERGRAPH_CACHE", str(Path(__file__).parents[1] / ".cache" / "rendergraph"))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

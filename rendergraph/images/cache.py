@@ -1,4 +1,4 @@
-"""Arrays cached on the disk by content: true pictures, which take minutes, and generated textures."""
+"""Arrays cached on disk by content: ground truth, which takes minutes to render, and generated textures."""
 
 from __future__ import annotations
 
@@ -19,19 +19,17 @@ from rendergraph.images.files import write_file
 
 
 class DiskCache:
-    """A folder of arrays, in `RENDERGRAPH_CACHE` or in the user's folder for caches. The oldest files go first.
+    """A folder of arrays, in `RENDERGRAPH_CACHE` or in the user's folder for caches.
 
-    A full or read-only disk is no error: what is not cached is made again.
+    Above `most_bytes` the least recently used files are deleted. If the disk is full or read-only, nothing is cached.
     """
 
     def __init__(self, name: str, most_bytes: int) -> None:
         self.name, self.most_bytes = name, most_bytes
 
     def _file(self, key: str) -> Path:
-        named = os.environ.get("RENDERGRAPH_CACHE")
-        base = (
-            Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "rendergraph"
-        )
+        user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
+        base = Path(os.environ.get("RENDERGRAPH_CACHE") or user / "rendergraph")
         return base / self.name / f"{hashlib.sha256(key.encode()).hexdigest()}.npz"
 
     def get(self, key: str) -> dict[str, npt.NDArray[Any]] | None:
