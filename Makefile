@@ -20,7 +20,7 @@ test quick nightly: export MALLOC_ARENA_MAX ?= 2
 .PHONY: check nightly format lint types imports docs pages pictures proofs gpu-times test quick clean
 
 check:
-	$(MAKE) --jobs=2 --output-sync --no-print-directory lint types imports pages
+	$(MAKE) --jobs=2 --output-sync --no-print-directory types pages lint imports
 	$(MAKE) --no-print-directory test
 
 format:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 import os
 import shutil
@@ -38,6 +39,9 @@ from rendergraph.api import Any as AnyTexel
 '''
 PIPELINE = "nodes:\n  a: {type: wrong}\noutputs: {image: a.color}\n"
 WHITE = "out vec4 color;\nvoid main() { color = vec4(1.0); }\n"
+
+# A process keeps thousands of tests alive, and visiting them takes a twentieth of the time.
+gc.set_threshold(20_000, 20, 100)
 
 # All processes of the tests share one cache, which is not the user's.
 os.environ.setdefault("RENDERGRAPH_CACHE", str(Path(__file__).parents[1] / ".cache" / "rendergraph"))

@@ -98,7 +98,8 @@ class Catalog:
 
         Their shaders are in the current folder, or in the folder of the class's module.
         """
-        more = Catalog(self._listed, self._types, self.extensions, self.notes)
+        others = {name: one for name, one in self._types.items() if one.cls is named.get(name, one.cls)}
+        more = Catalog(self._listed, others, self.extensions, self.notes)
         more._loaded, more._classes = self._loaded, {**self._classes, **named}
         return more
 

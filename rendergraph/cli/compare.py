@@ -128,8 +128,10 @@ report_options = options.together(
 @click.option(
     "-o",
     "--output",
+    "outputs",
+    multiple=True,
     type=options.FILE,
-    help="Write a report (.html), a figure (.pdf, .svg, .png), or a table (.tex, .csv).",
+    help="Write a report (.html), a figure (.pdf, .svg, .png), or a table (.tex, .csv); repeat for several files.",
 )
 @click.option(
     "--crop",
@@ -143,7 +145,7 @@ def compare(
     pipelines: tuple[str, ...],
     withs: tuple[tuple[str, ...], ...],
     reference: str | None,
-    output: Path | None,
+    outputs: tuple[Path, ...],
     crops: tuple[tuple[int, int, int, int], ...],
     thresholds: tuple[Threshold, ...],
     title: str,
@@ -176,14 +178,14 @@ def compare(
     if len(pipelines) < 2 and reference is None and not withs:
         ways = "name another, a --reference, or settings: --with NODE.PARAM=VALUE"
         raise UsageError(Problem("RG500", f"there is only one pipeline and nothing to compare it with; {ways}"))
-    if output is not None:
+    for output in outputs:
         if output.suffix.lower() not in (".html", ".htm", *_FIGURES, ".tex", ".csv"):
             text = f"a report is an HTML page; name it '{output.with_suffix('.html')}'"
             raise UsageError(Problem("RG501", f"{text}; figures end in .pdf, .svg or .png, tables in .tex or .csv"))
         check_target(output)
         if output.suffix.lower() in _FIGURES:
             require("a figure", "figures", "matplotlib")
-    elif title or note:
+    if not outputs and (title or note):
         raise UsageError(Problem("RG500", "--title and --note belong to a report; write one: -o report.html"))
     if not withs and settings["metric"] is None and _are_pictures(pipelines, reference, select):
         from rendergraph.catalog import Catalog
@@ -204,13 +206,14 @@ def compare(
     for line in comparison.notes:
         say(line)
     beyond = exceeded(comparison.results, thresholds)
-    if output is not None:
+    for output in outputs:
         _write(comparison, output, crops, title=title, note=note)
     if as_json:
-        emit_json(comparison.as_json() | ({"report": str(output)} if output else {}) | {"exceeded": beyond})
+        written = {"report": str(outputs[0]), "outputs": [*map(str, outputs)]} if outputs else {}
+        emit_json(comparison.as_json() | written | {"exceeded": beyond})
     else:
         emit(comparison_text(comparison))
-        if output is not None:
+        for output in outputs:
             say(f"report: {output}")
     for text in beyond:
         say(text, always=True)
@@ -297,8 +300,7 @@ def _write(comparison: Comparison, output: Path, crops: Sequence[Any], *, title:
     """Write a comparison as a page, a figure or a table, by the extension."""
     suffix = output.suffix.lower()
     if suffix in _FIGURES:
-        drawing = comparison.figure(crops, caption=note or title, errors=not crops)
-        drawing.savefig(output, dpi=300)
+        comparison.figure(crops, caption=note or title, errors=not crops).savefig(output, dpi=300)
         return
     if suffix == ".tex":
         from rendergraph.compare.report.figure import latex_table

@@ -62,7 +62,7 @@ def explain(topic: str, glsl: bool, pipeline: str | None, step: int | None, sele
     plugins = select(topic).plugins
     if not glsl and (pipeline or step is not None or select(topic) != Selection(topic, plugins=plugins)):
         raise UsageError(Problem("RG500", "--pipeline, --step and options that change a pipeline require --glsl"))
-    if pipeline is None and re.fullmatch(r"[Rr][Gg]\d+", topic):
+    if pipeline is None and not glsl and re.fullmatch(r"[Rr][Gg]\d+", topic):
         _print(reference.error_page(topic.upper()), _error_text, as_json)
     elif pipeline is None and topic in reference.FILE_KINDS:
         extensions = options.extensions(plugins) if topic == "scene" else None

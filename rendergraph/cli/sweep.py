@@ -373,8 +373,7 @@ def _report(sweep: Sweep | None, out: Path, count: int, *, as_json: bool) -> Non
     rendered = [] if sweep is None else [result.name for result in sweep.comparison.results]
     failed = () if sweep is None else sweep.failures
     if as_json:
-        failures = [failure.as_json() for failure in failed]
-        emit_json({"drawn": rendered, "failed": failures, "kept": count - len(rendered)})
+        emit_json({"drawn": rendered, "failed": [one.as_json() for one in failed], "kept": count - len(rendered)})
     else:
         for name in rendered:
             emit(str(out / name))

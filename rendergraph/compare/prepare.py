@@ -285,11 +285,11 @@ def prepare(
     space.check()
     if views := by_view(space, reference, options):
         parts = [prepare(base, part, out, own_reference, own) for part, own_reference, own in views]
-        by_name = {run.name: run for part in parts for run in part.runs}
-        names = [run_name(run) for run in space.runs()]
-        ordered = [by_name[name] for name in names if name in by_name]
-        runs = tuple(replace(run, number=number) for number, run in enumerate(ordered))
-        return replace(parts[0], runs=runs, space=space)
+        by_settings = {tuple(run.settings.items()): run for part in parts for run in part.runs}
+        named = zip(space.runs(), unique_names([run_name(run) for run in space.runs()]), strict=True)
+        ordered = [(by_settings.get(tuple(settings.items())), name) for settings, name in named]
+        found = [replace(run, name=name, folder=out / name) for run, name in ordered if run]
+        return replace(parts[0], runs=tuple(replace(run, number=at) for at, run in enumerate(found)), space=space)
     combinations = space.runs()
     names = unique_names([run_name(run) for run in combinations])
     base = measured_at(base, options.metric)
@@ -328,10 +328,10 @@ def by_view(space: Space, reference: Path | Pipeline | None, options: SweepOptio
     runs = space.runs()
     for number, run in enumerate(runs):
         groups.setdefault(tuple((path, run[path]) for path in paths), []).append(number)
-    if options.only is not None:
-        groups = {view: numbers for view, numbers in groups.items() if not set(options.only).isdisjoint(numbers)}
     if len(groups) < 2:
         return []
+    if options.only is not None:
+        groups = {view: numbers for view, numbers in groups.items() if not set(options.only).isdisjoint(numbers)}
     if isinstance(reference, Path):
         text = f"a picture cannot be the reference of several scenes; name a pipeline instead of '{reference}'"
         raise UsageError(Problem("RG500", text))

@@ -21,7 +21,7 @@ SMALL = ("--size", "48x27", "-s", "sun.resolution=64")
 
 
 def test_compare_prints_a_table_and_writes_a_page(cli: Any, tmp_path: Path) -> None:
-    found = cli("compare", "forward", "forward-prepass", *SMALL, "-n", "2", "-o", "it's.html")
+    found = cli("compare", "forward", "forward-prepass", *SMALL, "-n", "2", "-o", "it's.html", "-o", "a.csv")
     assert found.code == 0
     assert "forward-prepass" in found.out
     assert "FLIP" in found.out
@@ -31,6 +31,8 @@ def test_compare_prints_a_table_and_writes_a_page(cli: Any, tmp_path: Path) -> N
         "rendergraph compare forward forward-prepass --size 48x27 -s sun.resolution=64 -n 2 -o &#x27;it&#x27;&quot;"
     )
     assert command in page
+    with (tmp_path / "a.csv").open(newline="") as file:
+        assert [row["run"] for row in csv.DictReader(file)] == ["forward", "forward-prepass"]
 
 
 def test_compare_speaks_json(cli: Any) -> None:

@@ -411,6 +411,23 @@ def with_variant(linked: Any) -> Any:
     return structs.replace(linked, selection=structs.replace(linked.selection, variant="sea"))
 
 
+def test_runs_of_one_view_are_measured_as_in_the_whole_sweep(base: rg.Pipeline) -> None:
+    axes = {"environment": ["dawn", "noon"], "display.curve": ["aces", "none"]}
+    whole = prepare(base, axes, Path("out"))
+    part = prepare(base, axes, Path("out"), options=SweepOptions(only=(2, 3)))
+    assert [run.name for run in part.runs] == [run.name for run in whole.runs[2:]]
+    assert [run.reference_key for run in part.runs] == [run.reference_key for run in whole.runs[2:]]
+    assert whole.runs[0].reference_key != whole.runs[2].reference_key
+
+
+def test_runs_of_two_views_whose_names_would_be_equal_have_folders_of_their_own(base: rg.Pipeline) -> None:
+    cameras = ["eye=0,1,5 target=0,0,0", "eye=0,1,5  target=0,0,0"]
+    runs = prepare(base, {"camera": cameras}, Path("out")).runs
+    assert [run.name for run in runs] == ["camera=eye=0,1,5_target=0,0,0", "camera=eye=0,1,5_target=0,0,0-2"]
+    assert [run.folder for run in runs] == [Path("out") / run.name for run in runs]
+    assert [run.settings["camera"] for run in runs] == cameras
+
+
 @pytest.mark.slow
 def test_a_reference_picture_counts_by_its_content(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
     axes = (Axis("display.curve", ("aces", "none")),)
