@@ -55,6 +55,7 @@ SPREAD = {"test_docs", "test_registry", "test_modes", "test_cli_real"}
 """Files with long tests that share nothing: with `--dist loadgroup` any process may run them, and they come last."""
 
 
+@pytest.hookimpl(tryfirst=True)  # before pytest-xdist reads the groups
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Run tests marked `nightly` with `--nightly`, all others without, those that share fixtures in one process.
 

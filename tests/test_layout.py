@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 TESTS = Path(__file__).parent
 PACKAGE = TESTS.parent / "rendergraph"
 NODES = TESTS.parent / "nodes"
@@ -20,3 +22,9 @@ def test_tests_of_a_node_are_in_the_folder_of_its_family() -> None:
     tests = {file.stem.removeprefix("test_"): file.parent.name for file in TESTS.glob("nodes/*/test_*.py")}
     assert set(tests.values()) <= families
     assert {stem: folder for stem, folder in tests.items() if family.get(stem, folder) != folder} == {}
+
+
+def test_tests_of_a_file_run_in_one_process(request: pytest.FixtureRequest) -> None:
+    if not request.config.getoption("loadgroup", False):
+        pytest.skip("needs --dist loadgroup")
+    assert request.node.nodeid.endswith("@test_layout")  # otherwise each process makes the fixtures of a file again

@@ -244,7 +244,8 @@ def _files(name: str, kind: Kind, *, package: bool = False, nodes: str = "", fil
         words["plugins"] = ""
     files = {}
     if package:
-        files = {f"{name}/{file.name.removesuffix('.in')}": _fill(file, words) for file in _templates("package")}
+        own = {file.name.removesuffix(".in"): _fill(file, words) for file in _templates("package")}
+        files = {f"{name}/{'.' * (file == 'gitignore')}{file}": text for file, text in own.items()}
         for root in ("nodes", "shaders"):
             files[f"{name}/{root}/__init__.py"] = f'"""{root.capitalize()} of `{words["package"]}`."""\n'
     homes = {"test": "tests", "node": nodes} if nodes else {}
@@ -262,12 +263,9 @@ def _files(name: str, kind: Kind, *, package: bool = False, nodes: str = "", fil
 
 
 def _summary(kind: Kind) -> str:
-    for file in _templates(kind):
-        text = file.read_text(encoding="utf-8")
-        found = re.search(r'class @Class@\(Node\):\n    """(.*?)(?:"""|\n)', text) or re.search(r"doc: (.*)", text)
-        if found:
-            return found[1]
-    raise AssertionError(f"the templates of '{kind}' have no docs")
+    texts = (file.read_text(encoding="utf-8") for file in _templates(kind))
+    found = (re.search(r'(?:class @Class@\(Node\):\n    """|doc: )(.*?)(?:"""|\n)', text) for text in texts)
+    return next(match[1] for match in found if match)
 
 
 def _templates(kind: str) -> list[Path]:

@@ -38,7 +38,7 @@ def _topics(ctx: Context, incomplete: str) -> list[str]:
 
     names = Catalog.discover(()).names()
     shipped = {*shipped_pipelines(), *shipped_scenes(), *_environments(ctx, incomplete)}
-    return sorted({*names, *shipped, *reference.FILE_KINDS})
+    return sorted({*names, *shipped, *reference.FILE_KINDS} - {"none"})
 
 
 def _environments(ctx: Context, incomplete: str) -> Iterable[str]:

@@ -364,7 +364,7 @@ def _subsample(picture: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
 
 def texel(pixels: Pixels, x: float, y: float) -> dict[str, Any]:
     """Return the values at a position, 0…1 from the left and from the top; layers are arranged in a grid, as shown."""
-    array = pixels if pixels.ndim == 4 else pixels[np.newaxis]
+    array = {2: pixels[np.newaxis, ..., np.newaxis], 3: pixels[np.newaxis]}.get(pixels.ndim, pixels)
     count, height, width, _ = array.shape
     columns = math.ceil(math.sqrt(count))
     rows = math.ceil(count / columns)

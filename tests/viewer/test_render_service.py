@@ -120,6 +120,8 @@ def test_layers_lie_in_a_grid_and_a_pixel_says_which() -> None:
     assert texel(layers, 0.99, 0.01) == {"at": [3, 0], "layer": 1, "values": [11.0]}
     assert texel(layers, 0.01, 0.99) == {"at": [0, 1], "layer": 2, "values": [20.0]}
     assert texel(layers, 0.99, 0.99) == {}
+    buffer = np.arange(6, dtype=np.float32).reshape(3, 2)  # records, values
+    assert texel(buffer, 0.6, 0.9) == {"at": [1, 2], "layer": None, "values": [5.0]}
 
 
 def test_figures_of_a_texture(gl: rg.Session) -> None:
