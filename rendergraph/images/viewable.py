@@ -8,7 +8,8 @@
 | `depth`, `linear_depth`, `shadow_map` | nearest black, farthest white, uncovered texels white |
 | `visibility`, `occlusion`, `material` | 0…1 unchanged, no curve |
 | integers | a colour for each, 0 black |
-| anything else | 0…1 unchanged; values outside: scaled so that all but 1 % at each end fit |
+| anything else within 0…1 | unchanged |
+| anything else | scaled so that all but 1 % at each end fit; with values below 0, 0 is middle grey |
 
 One channel is grey, two are red and green, a fourth is ignored; layers form a grid, row by row. NaN is magenta.
 """
@@ -42,8 +43,7 @@ _BACKGROUND, _NAME_GREY, _NOTE_GREY = 32, 0.95, 0.6
 def to_srgb(linear: Pixels) -> npt.NDArray[np.float32]:
     """Encode linear values 0…1 as sRGB (IEC 61966-2-1); values outside are clipped."""
     values = np.clip(np.asarray(linear, dtype=np.float32), 0.0, 1.0)
-    encoded = np.where(values <= 0.0031308, values * 12.92, 1.055 * np.power(values, 1 / 2.4) - 0.055)
-    return encoded.astype(np.float32)
+    return np.where(values <= 0.0031308, values * 12.92, 1.055 * values ** (1 / 2.4) - 0.055).astype(np.float32)
 
 
 def from_srgb(encoded: Pixels) -> npt.NDArray[np.float32]:
@@ -65,10 +65,8 @@ def to_bytes(unit: Pixels) -> Bytes:
 def heat_map(values: Pixels) -> Bytes:
     """Map values 0…1 to colours; NaN counts as 1."""
     position = np.clip(np.nan_to_num(values, nan=1.0), 0, 1) * (len(_HEAT) - 1)
-    lower = np.minimum(position.astype(int), len(_HEAT) - 2)
-    fraction = (position - lower)[..., np.newaxis]
-    mixed = _HEAT[lower] * (1 - fraction) + _HEAT[lower + 1] * fraction
-    return np.asarray(mixed + 0.5).astype(np.uint8)
+    mixed = [np.interp(position, np.arange(len(_HEAT)), channel) for channel in _HEAT.T]
+    return (np.stack(mixed, axis=-1) + 0.5).astype(np.uint8)
 
 
 def signed_map(values: Pixels) -> Bytes:
@@ -146,7 +144,11 @@ def _colors(array: Pixels, semantic: str, *, light: bool) -> Bytes:
     if semantic == "normal":
         return to_bytes(values * np.float32(0.5) + np.float32(0.5))
     finite = values[np.isfinite(values)]
-    if semantic not in _UNIT and finite.size and (finite.min() < 0 or finite.max() > 1):
+    if semantic not in _UNIT and finite.size and finite.min() < 0:
+        values = values if values.shape[-1] != 2 else np.concatenate([values, np.zeros_like(values[..., :1])], axis=-1)
+        size = np.abs(finite)
+        return to_bytes(values / (2 * (np.quantile(size, 0.99) or size.max())) + 0.5)
+    if semantic not in _UNIT and finite.size and finite.max() > 1:
         return to_bytes(_stretched(values, background=math.inf, outside=0.01))
     return to_bytes(values)
 

@@ -328,7 +328,8 @@ def test_srgb_is_its_own_inverse() -> None:
         ("normal", [[0.0, -1.0, 1.0]], [[128, 0, 255]]),
         ("display_color", [[0.0, 0.5, 1.0]], [[0, 128, 255]]),
         ("any", [[0.0, 0.5, 1.0]], [[0, 128, 255]]),
-        ("any", [[-1.0, 0.0, 3.0]], [[0, 64, 255]]),
+        ("any", [[-4.0, 0.0, 2.0]], [[0, 128, 192]]),
+        ("any", [[1.0, 2.0, 3.0]], [[0, 128, 255]]),
     ],
 )
 def test_colours_are_shown(semantic: str, values: list[list[float]], expected: list[list[int]]) -> None:
@@ -349,6 +350,7 @@ def test_a_few_great_values_do_not_leave_the_rest_black() -> None:
     one = np.zeros((100, 100), np.float32)
     one[3, 4] = 7.0
     assert viewable(one, "heat").sum() == 255
+    assert viewable(-one, "motion")[3:5, 4, 0].tolist() == [0, 128]
 
 
 def test_depths_are_stretched_and_the_background_is_white() -> None:
@@ -377,6 +379,8 @@ def test_layers_lie_in_a_grid_and_two_channels_are_red_and_green() -> None:
     assert sheet.shape == (4, 6, 1)
     assert sheet[2, 0, 0] == 102
     assert viewable(np.full((1, 1, 2), 1.0, np.float32), "any").tolist() == [[[255, 255, 0]]]
+    still = np.array([[[0.0, 0.0], [2.0, -2.0]]], np.float32)
+    assert viewable(still, "velocity").tolist() == [[[128, 128, 128], [255, 0, 128]]]
 
 
 @pytest.mark.parametrize("semantic", ["radiance", "depth", "normal", "any", "visibility", "shadow_map"])
