@@ -285,7 +285,7 @@ def _memory(
     constant = sum(physicals[place].bytes for id in schedule.whole_frame for place in placement[id])
     allocated = sum(physical.bytes for physical in physicals)
     viewed = any(resources[id].desc != physical.desc for physical in physicals for id in physical.members)
-    totals = [(name, constant + sharing.bytes(groups)) for name, groups in better]
+    totals: list[tuple[Tier, int]] = [(name, constant + sharing.bytes(groups)) for name, groups in better]
     next_tier, next_bytes = next((tier for tier in totals if tier[1] < allocated), (None, None))
     return MemoryFigures(
         no_reuse_bytes=sum(resource.bytes for resource in resources.values()),

@@ -246,13 +246,10 @@ def _sweep_of_views(base: Pipeline, views: Sequence[View], out: Path, options: S
         notes=tuple(dict.fromkeys(note for each in comparisons for note in each.notes)),
         warnings=tuple(dict.fromkeys(problem for each in comparisons for problem in each.warnings)),
     )
-    counts = ("executed", "alone", "resumed", "timed", "redrawn", "torn")
-    return Sweep(
-        comparison,
-        space,
-        failures=tuple(failure for part in parts for failure in part.failures),
-        **{name: sum(getattr(part, name) for part in parts) for name in counts},
-    )
+    names = ("executed", "alone", "resumed", "timed", "redrawn", "torn")
+    counts: dict[str, Any] = {name: sum(getattr(part, name) for part in parts) for name in names}
+    failures = tuple(failure for part in parts for failure in part.failures)
+    return Sweep(comparison, space, failures=failures, **counts)
 
 
 def compare_pictures(

@@ -174,6 +174,6 @@ def _given_class(values: npt.NDArray[np.float32]) -> type[Node]:
 
 
 def _four_channels(pixels: Pixels) -> npt.NDArray[np.float32]:
-    values = pixels.astype(np.float32) / (255 if pixels.dtype == np.uint8 else 1)
+    values = pixels.astype(np.float32) / np.float32(255 if pixels.dtype == np.uint8 else 1)
     alpha = np.ones((*values.shape[:2], 4 - values.shape[-1]), np.float32)
     return np.ascontiguousarray(np.concatenate([values, alpha], axis=-1))

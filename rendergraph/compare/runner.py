@@ -93,7 +93,7 @@ class Runner:
                     self._task_event(farm, event)
                 elif isinstance(event.value, tasks.ReferenceResult):
                     found, self.device = event.value.reference, event.value.origin["device"]
-                else:
+                elif isinstance(event.value, TruthProgress):
                     at = event.value
                     tell(round(100 * at.part), 100)
         assert found is not None  # a task that fails raises

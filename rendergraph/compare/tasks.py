@@ -129,7 +129,7 @@ class VariantTask(Task):
                 elif reference is None or is_retryable(error):
                     raise
                 else:
-                    yield TaskError(runs[batch.numbers[0]][0].number, map_remote_paths(error, worker.root))
+                    yield TaskError(runs[min(batch.numbers)][0].number, map_remote_paths(error, worker.root))
 
     def _batch(
         self, worker: Worker, batch: Batch, runs: Sequence[tuple[Run, Planned]], reference: Reference | None

@@ -8,7 +8,6 @@ is the sum of both.
 
 from __future__ import annotations
 
-import itertools
 import math
 import time
 from collections.abc import Iterator, Sequence
@@ -156,7 +155,9 @@ def draw_truth(
         drawing = stages.compile(stages.expand(planned.linked, options), gpu)
         drawing.begin(lead=0)
     due, share, excess, samples, seconds = 1, 0.0, None, 0, 0.0
-    for drawn in itertools.count(1):
+    drawn = 0
+    while True:
+        drawn += 1
         part = max(share * (drawn - 1) / due, seconds / limits.seconds)
         yield TruthProgress(min(1.0, part), samples * (drawn - 1), excess)
         with gpu.current():

@@ -67,7 +67,7 @@ class Recording:
     def run(self) -> str | None:
         """Call the node's `record`; return why the node is idle if it only leaves its inputs as they are."""
         node, ports = self.node, self.node.node.ports()
-        steps = Steps(ports, node.id, node.type.name, self)
+        steps = Steps(ports, node.id, node.type.name, self)  # pyright: ignore[reportArgumentType]
         try:
             _returns_nothing(node.node.record(steps))  # type: ignore[func-returns-value]  # third-party nodes may
         except InputError:
@@ -234,11 +234,8 @@ def _record(
             idle[name] = _why_unread(graph, node, reached)
             continue
         reached.add(name)
-        reason = _why_idle(graph, node, used)
-        if not reason:
-            recording = Recording(graph, node, used)
-            reason = recording.run()
-        if reason:
+        recording = Recording(graph, node, used)
+        if reason := _why_idle(graph, node, used) or recording.run():
             idle[name] = reason
             demand(end for port in used for end in node.inputs.get(port, ()))
         else:

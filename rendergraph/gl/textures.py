@@ -117,10 +117,10 @@ def transfer_format(format_name: str) -> tuple[int, int, Any, int]:
     if fmt.family == "depth_stencil":
         return _DEPTH_STENCIL, _FLOAT_32_UNSIGNED_INT_24_8_REV, np.float32, 2
     if fmt.family in ("uint", "int"):
-        integer = (_UINT, np.uint32) if fmt.family == "uint" else (_INT, np.int32)
-        return _INTEGER_CHANNELS[fmt.components], *integer, fmt.components
-    number = (_UBYTE, np.uint8) if fmt.is_bytes else (_FLOAT, np.float32)
-    return _CHANNELS[fmt.components], *number, fmt.components
+        gl_type, integer = (_UINT, np.uint32) if fmt.family == "uint" else (_INT, np.int32)
+        return _INTEGER_CHANNELS[fmt.components], gl_type, integer, fmt.components
+    gl_type, number = (_UBYTE, np.uint8) if fmt.is_bytes else (_FLOAT, np.float32)
+    return _CHANNELS[fmt.components], gl_type, number, fmt.components
 
 
 def read(

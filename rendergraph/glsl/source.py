@@ -174,8 +174,8 @@ class Includes:
         self._plugged = dict(plugged or {})
         self._versions = versions
         self._inherited = inherited
-        is_from_shadertoy = source.suffix == ".frag" and is_shadertoy(text := runs(source)[0])
-        if is_from_shadertoy:
+        text = runs(source)[0] if source.suffix == ".frag" else ""
+        if is_from_shadertoy := is_shadertoy(text):
             self._before_shadertoy(text)
         self._file(source, root, Origin(prefix=prefix), [])
         if is_from_shadertoy:

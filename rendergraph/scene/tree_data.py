@@ -126,7 +126,7 @@ def mesh_trees(scene: Scene, packed: PackedScene, flags: Ints, before: MeshTrees
     result for an earlier pose of animated meshes.
     """
     shared = _shared(scene, packed)
-    held: list[dict[str, Any]] = [mesh.__dict__ for mesh in scene.meshes]
+    held: list[dict[str, Any]] = [vars(mesh) for mesh in scene.meshes]
     held.append({} if before is None else {"tree": before.tree})
     shapes: list[_Shape] = []
     for record in packed.meshes:
@@ -251,5 +251,5 @@ def _inverses(packed: PackedScene) -> tuple[Matrix, npt.NDArray[np.bool_]]:
     if is_flat.any():
         u, values, v = np.linalg.svd(linear[is_flat])
         linear[is_flat] = u * np.maximum(values, np.maximum(values[:, :1], 1e-30) * _THINNEST)[:, None] @ v
-    inverse = np.linalg.inv(linear)
+    inverse = np.linalg.inv(linear).astype(np.float64, copy=False)
     return np.concatenate([inverse, -(inverse @ rows[:, :, 3:])], axis=2), size > 0

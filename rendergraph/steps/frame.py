@@ -44,6 +44,8 @@ class ViewMatrices:
     jitter: tuple[float, float] = (0.0, 0.0)
 
 
+# Methods of protocols have no bodies.
+# pyright: reportReturnType=false
 class FrameScene(Protocol):
     """The scene in one frame: `Frame.scene`. `SceneKey.of` reads plugins' keys of its objects, materials and lights."""
 

@@ -20,6 +20,8 @@ from rendergraph.textures import BufferDesc, TextureDesc
 from rendergraph.typecheck import quoted
 
 
+# Methods of protocols have no bodies.
+# pyright: reportReturnType=false
 class Recorder(Protocol):
     """The interface of `Steps` to the stage that expands a graph; node authors never use it."""
 

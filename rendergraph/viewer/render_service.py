@@ -43,6 +43,7 @@ THUMBNAIL = 176
 """Pixels along the longer side of a small picture."""
 BINS = 64
 _MOST_CACHED = 4
+_OPTIONS = RenderOptions(warm_up=False, timed=True, reuse=True, share=True)
 _LIGHT = frozenset({"radiance", "emissive", "luminance", "irradiance", "reflections"})
 
 
@@ -234,10 +235,8 @@ class RenderService:
             main = "image" if "image" in outputs else next(iter(outputs))
             assert self._planned is not None  # the first picture is still, and so planned
             alias = self._planned.plan.memory.no_reuse_bytes > NO_ALIAS_BYTES
-            asked = {"outputs": (port,)} if port in outputs else {"outputs": (main,), "taps": (port,) if port else ()}
-            options = RenderOptions(
-                **asked, fps=request.fps, warm_up=False, timed=True, reuse=True, alias=alias, share=True
-            )
+            asked, taps = (port, ()) if port in outputs else (main, (port,) if port else ())
+            options = replace(_OPTIONS, outputs=(asked,), taps=taps, fps=request.fps, alias=alias)
             _store(self._expanded, key, stages.expand(linked, options))
         return self._expanded[key]
 

@@ -289,7 +289,7 @@ class Server:
             self._judging = asyncio.create_task(self._judge())
 
     async def _judge(self) -> None:
-        judged = None
+        judged = problems = None
         while judged != (selection := self._state.selection):
             judged = selection
             problems = await asyncio.to_thread(editing.problems_of, selection)
