@@ -140,7 +140,7 @@ def test_an_extension_that_ends_is_a_mistake(cli: Any, plugin: Path, what: str, 
     ("body", "code", "said"),
     [
         ("return 1 / 0", 3, "extension.py:2:1: RG497 metric 'darker' of "),
-        ("return 'dark'", 3, "plugin 'sketch' gave str, not a number"),
+        ("return 'dark'", 3, "plugin 'sketch' returned str, not a number"),
         ("raise SystemExit(0)", 3, "extension.py:2:1: RG497 metric 'darker' of "),
         ("raise BaseException('enough')", 3, "BaseException: enough (plugin 'sketch')"),
         ("raise ValueError('long ' * 1000)", 3, "long long … (plugin 'sketch')"),
