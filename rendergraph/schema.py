@@ -59,7 +59,8 @@ def schema(catalog: Catalog, bases: Mapping[str, Mapping[str, str]] = {}, links:
             needed[name] = _needed(cls)
     found = file_schema(PIPELINE)
     found["properties"]["nodes"]["additionalProperties"] = {"$ref": "#/definitions/node"}
-    found["definitions"] = {"node": _node(types, rules), "whole_node": _whole_node(needed)}
+    whole_node = {"if": _has("enabled", False), "else": {"allOf": _by_type(needed)}}  # with all inputs it needs
+    found["definitions"] = {"node": _node(types, rules), "whole_node": whole_node}
     whole = {"properties": {"nodes": {"additionalProperties": {"$ref": "#/definitions/whole_node"}}}}
     # Files that extend others, and patches, need not connect everything; they lack one of these keys.
     alone = {"required": ["rendergraph", "nodes", "outputs"], "not": {"required": ["extends"]}}
@@ -105,11 +106,6 @@ def _node(types: Mapping[str, type[Node] | None], rules: Mapping[str, Schema]) -
     for part in ("inputs", "params"):  # the node's type defines them
         properties[part] = {"type": ["object", "null"], "description": properties[part]["description"]}
     return {**found, "allOf": _by_type(rules)}
-
-
-def _whole_node(needed: Mapping[str, Schema]) -> Schema:
-    """Require the inputs that each type needs, except for disabled nodes."""
-    return {"if": _has("enabled", False), "else": {"allOf": _by_type(needed)}}
 
 
 def _by_type(rules: Mapping[str, Schema]) -> list[Schema]:

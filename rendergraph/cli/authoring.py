@@ -85,10 +85,7 @@ def new_node(name: str, kind: str, package: bool, as_json: bool) -> None:
 
 def print_files(written: NewNode, about: dict[str, str], as_json: bool) -> None:
     files = [path.as_posix() for path in written.files]
-    if as_json:
-        emit_json({**about, "files": files, "commands": list(written.commands)})
-    else:
-        emit("\n".join(files))
+    emit_json({**about, "files": files, "commands": list(written.commands)}) if as_json else emit("\n".join(files))
     say("next:\n" + "\n".join(f"  {line}" for line in written.commands))
 
 

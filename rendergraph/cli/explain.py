@@ -275,10 +275,12 @@ def _scene_text(entry: Entry) -> str:
         (one["name"], one["triangles"], one["material"], "" if one["casts_shadow"] else "casts no shadow")
         for one in entry["objects"]
     ]
+    low, high = (", ".join(f"{value:.4g}" for value in corner) for corner in entry["bounds"])
     return sections(
         f"{entry['scene']}  (scene, {entry['triangles']} triangles{', animated' if entry['moves'] else ''})",
         entry["line"],
         listed("Objects", objects, ("name", "triangles", "material", ""), right=(1,)),
+        f"From ({low}) to ({high}), in metres." if objects else "",
         listed("Clips", [(one["name"], f"{one['seconds']:g} s") for one in entry["clips"]]),
         listed("Variants", [(name, "") for name in entry["variants"]]),
         listed("Materials", [(one["name"], one["line"]) for one in entry["materials"]]),

@@ -153,7 +153,8 @@ def build(boxes: Floats, sizes: Sequence[int], most: int = LEAF) -> list[Tree]:
         np.maximum.at(depths, tree, batch.level[inner] + 1)
         rest = np.flatnonzero(~primitives)
         node_of = np.repeat(np.arange(nodes), batch.count[inner])
-        rest = rest[_stable_order(2 * node_of + side[rest], 2 * nodes)]
+        keys = 2 * node_of + side[rest]  # NumPy has a radix sort for 16 bits
+        rest = rest[np.argsort(keys.astype(np.uint16) if nodes <= 1 << 15 else keys, kind="stable")]
         counts_of = np.stack([left[inner], batch.count[inner] - left[inner]], axis=1)
         starts = np.cumsum(counts_of.reshape(-1)) - counts_of.reshape(-1)
         inside = batch.boxes[:, rest]
@@ -249,11 +250,6 @@ def _ranges(first: Ints, count: Ints) -> Ints:
     """Return the concatenated ranges of `count` numbers from each `first`."""
     starts = np.cumsum(count) - count
     return np.repeat(first - starts, count) + np.arange(int(count.sum()))
-
-
-def _stable_order(keys: Ints, count: int) -> Ints:
-    """Return the stable sorting order of keys below `count`; NumPy uses a radix sort for 16 bits."""
-    return np.argsort(keys.astype(np.uint16) if count <= 1 << 16 else keys, kind="stable")
 
 
 def _split(batch: _Batch) -> tuple[Ints, Bools, Bools]:

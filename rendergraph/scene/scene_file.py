@@ -92,7 +92,7 @@ def _check_names(root: Value, changes: Value, whole: Value, validator: Validator
         for name, entry in _entries(changes, section).items():
             option = entry.source.origin
             if name not in known and isinstance(option, Option) and option.path.count(".") > 2:
-                hint = suggestion(str(name), known) or f"; the scene has no {section}"
+                hint = suggestion(str(name), known) or f"; -s 'scene.{section}.{name}={{…}}' adds one"
                 text = f"there is no {section.removesuffix('s')} '{shown(name)}'{hint}"
                 validator.report(entry, "RG322", text)
                 del whole.mapping[section].mapping[name]

@@ -314,7 +314,7 @@ class Server:
             try:
                 await asyncio.wait_for(self._wake.wait(), WATCH_SECONDS)
             except TimeoutError:
-                if self._pages and await self._files_changed():
+                if self._pages and (self._state.follow() or await self._files_changed()):
                     self._thumbnails_of = None
                     self._request_picture()
                 self._send_state()  # the edited file may have changed on disk

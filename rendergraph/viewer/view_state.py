@@ -209,6 +209,15 @@ class ViewState:
             "environments": [*SHIPPED, "none"],
         }
 
+    def follow(self) -> bool:
+        """Take over the opened file from the disk if it has changed since it was saved here and nothing else has."""
+        text = _read(self.file)
+        if not text or not self.is_behind or self.is_changed:
+            return False
+        self._disk, self.edits = text, replace(self.edits, text=text)
+        self._saved = self.edits.state
+        return True
+
     def record(self, response: Response) -> None:
         if response.camera is not None:
             self._last_camera = response.camera
@@ -324,7 +333,8 @@ class ViewState:
             case messages.ViewMessage(name):
                 self._look_through(name)
             case messages.KeepViewMessage(name):
-                camera, environment = self.selection.camera, self.selection.environment
+                seen, environment = self._last_camera, self.selection.environment
+                camera = self.selection.camera or (camera_words(seen) if seen else None)
                 frame = self.frame if self.frame > 1 else None
                 values = {"camera": camera, "frame": frame, "environment": environment and str(environment)}
                 self.edit([["view", name, {key: value for key, value in values.items() if value is not None}]])

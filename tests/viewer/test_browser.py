@@ -322,6 +322,8 @@ def test_names_are_text(show: Callable[..., Hand], tmp_path: Path) -> None:
     assert hand.text("#about") == name
     assert hand.page.query_selector("img[src=x]") is None
     assert hand.page.title().startswith("mine")
+    hand.page.wait_for_selector("#p-scene option[value=courtyard]", state="attached")
+    hand.page.wait_for_selector("#p-environment option[value=dawn]", state="attached")
 
 
 def test_the_keyboard_alone_is_enough(page: Hand) -> None:
@@ -353,9 +355,12 @@ def test_two_tabs_are_one_view(page: Hand) -> None:
     page.choose("display")
     page.after(lambda: other.page.fill("[id='p-display.exposure']", "1") or other.page.keyboard.press("Enter"))
     assert page.page.input_value("[id='p-display.exposure']") == "1"
+    assert page.page.locator("#exposure").is_hidden()  # it acts on light alone
+    page.after(lambda: other.page.select_option("#port", "light.radiance"))
     other.page.locator("#exposure").fill("2")
     page.page.wait_for_selector("#exposure-value:has-text('2 EV')")
     assert page.page.input_value("#exposure") == "2"
+    page.after(lambda: other.page.select_option("#port", ""))
     page.page.click("#tab-changes")
     field = page.page.locator("[id='p-display.exposure']")
     field.fill("9")

@@ -112,6 +112,21 @@ def test_a_file_that_changed_meanwhile_is_not_overwritten_unseen(state: ViewStat
     assert "glow" in (state.edits.text or "")
 
 
+def test_a_saved_file_is_followed_again(state: ViewState, folder: Path) -> None:
+    insert_bloom(state)
+    text = state.save("mine.yaml", state.draft("mine.yaml")[2])
+    assert not state.follow()
+    (folder / "mine.yaml").write_text(text + "  light: {params: {ambient: 0.9}}\n")
+    assert state.follow()
+    assert "ambient: 0.9" in (state.selection.text or "")
+    assert not (state.is_behind or state.is_changed or state.follow())
+    say(state, do="undo")
+    assert "ambient: 0.9" not in (state.edits.text or "")
+    (folder / "mine.yaml").write_text(text)
+    assert not state.follow()  # it would lose the change
+    assert state.is_behind
+
+
 def test_a_shipped_pipeline_is_extended(folder: Path) -> None:
     state = ViewState(rg.Selection("forward", size=(48, 27), sets=("light.ambient=0.1",)), folder)
     insert_bloom(state)
@@ -302,6 +317,9 @@ def test_any_fifty_actions_saved_are_what_the_page_shows(gl: rg.Session, folder:
 def test_a_view_is_kept_in_the_file_and_looked_through(gl: rg.Session, state: ViewState, folder: Path) -> None:
     service = RenderService(gl)
     before = pixels(service, state, folder)
+    say(state, do="keep_view", name="as_it_was")
+    assert "as_it_was:\n    camera: " in (state.edits.text or "")  # although it is that of the scene
+    say(state, do="undo")
     say(state, do="camera", orbit=[0.4, 0.1])
     say(state, do="frame", number=7)
     say(state, do="set", path="environment", value="overcast")

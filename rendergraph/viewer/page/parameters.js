@@ -187,10 +187,10 @@ function surroundings(pipeline, edits, { scenes = [], environments = [] }) {
     ...["", ...pipeline.views].map((name) => h("option", { value: name }, name || (pipeline.views.length ? "choose" : "none is kept"))));
   const keep = h("button", { onclick: () => {
     const name = document.getElementById("p-view-name");
-    if (name.value && name.checkValidity()) send({ do: "keep_view", name: name.value });
-    else name.reportValidity();
+    name.required = true;  // only now: an empty field is no mistake before
+    if (name.reportValidity()) send({ do: "keep_view", name: name.value });
   } }, "Keep view");
-  const name = h("input", { type: "text", id: "p-view-name", size: 8, pattern: "[A-Za-z_][A-Za-z0-9_\\-]*", required: true, placeholder: "name", "aria-label": "Name of the view to keep" });
+  const name = h("input", { type: "text", id: "p-view-name", size: 8, pattern: "[A-Za-z_][A-Za-z0-9_\\-]*", title: "A letter, then letters, digits, _ or -", placeholder: "name", "aria-label": "Name of the view to keep" });
   return [
     chooser("scene", scenes, pipeline.scene, "What is drawn."),
     chooser("environment", environments, pipeline.environment, "The light from all around."),
@@ -205,7 +205,7 @@ export function showParameters(container, pipeline, node, edits, surrounding = {
   // both wait.
   if (held !== null) return;
   const keptRow = writing && container.contains(writing) ? writing.closest(".parameter") : null;
-  const values = [pipeline, node, JSON.stringify(edits)];
+  const values = [pipeline, node, JSON.stringify([edits, surrounding])];
   if (values.every((value, i) => value === shown.values[i]) && (shown.keptRow === null || shown.keptRow === keptRow)) return;
   shown = { values, keptRow, newRow: null };
   if (container.dataset.node !== node) document.getElementById("help").textContent = "";  // it is of another node

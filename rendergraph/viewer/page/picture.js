@@ -62,6 +62,7 @@ export function showPixel({ pixel }) {
 }
 
 const FACES = ["+x", "-x", "+y", "-y", "+z", "-z"];
+const LIGHT = ["radiance", "emissive", "luminance", "irradiance", "reflections"];  // shown with the slider's exposure
 
 // What can be chosen of the shown texture, and how it is shown.
 export function showLooking(pipeline, state) {
@@ -73,6 +74,7 @@ export function showLooking(pipeline, state) {
   const layer = /^\d+/.exec(part ?? "")?.[0] ?? "", mip = /mip=(\d+)/.exec(part ?? "")?.[1] ?? "0";
   $("layer").parentElement.hidden = !(layers > 1);
   $("mip").parentElement.hidden = !(mips > 1);
+  $("exposure-label").hidden = !LIGHT.includes(output?.semantic);
   choices($("layer"), ["", ...Array(layers).keys()].map(String), layer, (name) => (name === "" ? "all" : output?.kind === "texture_cube" ? FACES[name] : name));
   choices($("mip"), [...Array(mips).keys()].map(String), mip);
   const look = () => {
