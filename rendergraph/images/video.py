@@ -81,16 +81,16 @@ class Film:
         if self._writer is None:
             imageio_ffmpeg: Any = import_module("imageio_ffmpeg")  # an optional package with few types
 
-            height, width = pixels.shape[:2]
             codec, pixel_format, more = ENDINGS[self.path.suffix.lower()]
             self._writer = imageio_ffmpeg.write_frames(
                 str(self._part),
-                (width, height),
+                pixels.shape[1::-1],  # width and height
                 fps=self._fps,
                 codec=codec,
                 pix_fmt_out=pixel_format,
                 macro_block_size=1,
-                output_params=list(more),
+                quality=None,  # its default would overrule what `more` says
+                output_params=[*more],
                 ffmpeg_log_level="error",
             )
             self._writer.send(None)
