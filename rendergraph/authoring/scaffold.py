@@ -245,7 +245,7 @@ def _files(name: str, kind: Kind, *, package: bool = False, nodes: str = "", fil
     files = {}
     if package:
         own = {file.name.removesuffix(".in"): _fill(file, words) for file in _templates("package")}
-        files = {f"{name}/{'.' * (file == 'gitignore')}{file}": text for file, text in own.items()}
+        files = {f"{name}/{'.gitignore' if file == 'gitignore' else file}": text for file, text in own.items()}
         for root in ("nodes", "shaders"):
             files[f"{name}/{root}/__init__.py"] = f'"""{root.capitalize()} of `{words["package"]}`."""\n'
     homes = {"test": "tests", "node": nodes} if nodes else {}

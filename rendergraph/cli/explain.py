@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rendergraph.typecheck import Schema
 
 _SCHEMAS = ("pipeline", "scene", "sweep", "results", "results-csv")
+_ERROR = re.compile(r"[Rr][Gg]\d+")
 Entry = dict[str, Any]
 """Facts about a topic, as `--json` prints them."""
 
@@ -62,14 +63,14 @@ def explain(topic: str, glsl: bool, pipeline: str | None, step: int | None, sele
     plugins = select(topic).plugins
     if not glsl and (pipeline or step is not None or select(topic) != Selection(topic, plugins=plugins)):
         raise UsageError(Problem("RG500", "--pipeline, --step and options that change a pipeline require --glsl"))
-    if pipeline is None and not glsl and re.fullmatch(r"[Rr][Gg]\d+", topic):
-        _print(reference.error_page(topic.upper()), _error_text, as_json)
-    elif pipeline is None and topic in reference.FILE_KINDS:
-        extensions = options.extensions(plugins) if topic == "scene" else None
-        _print({"file": topic, "keys": reference.file_keys(topic, extensions)}, _keys_text, as_json)
-    elif glsl:
+    if glsl:
         linked, node = _node(topic, pipeline, select, partial(_unknown, topic))
         _print(reference.describe_program(linked, node, step), _program_text, as_json)
+    elif _ERROR.fullmatch(topic):
+        _print(reference.error_page(topic.upper()), _error_text, as_json)
+    elif topic in reference.FILE_KINDS:
+        extensions = options.extensions(plugins) if topic == "scene" else None
+        _print({"file": topic, "keys": reference.file_keys(topic, extensions)}, _keys_text, as_json)
     else:
         _node_or_file(topic, select, as_json)
 
@@ -138,7 +139,7 @@ def _unknown(topic: str, types: Iterable[str]) -> str:
     from rendergraph.pipelines.environments import SHIPPED
 
     names = [*types, *reference.FILE_KINDS, *shipped_pipelines(), *shipped_scenes(), *SHIPPED]
-    if topic in names:
+    if topic in names or _ERROR.fullmatch(topic):
         return f"'{topic}' has no program; --glsl takes a node type, or a node of --pipeline"
     if shader := next((f"./{topic}{suffix}" for suffix in SHADERS if Path(f"{topic}{suffix}").is_file()), None):
         return f"unknown name '{topic}'; did you mean '{shader}'?"

@@ -25,7 +25,7 @@ from rendergraph.compare.prepare import (
 )
 from rendergraph.compare.results import Comparison, Reference, Result, Results, Search, measure_against, pareto
 from rendergraph.compare.runner import Runner, SweepRunner
-from rendergraph.compare.space import Axes, Space, run_name, typed, unique_names
+from rendergraph.compare.space import Axes, Space, typed, unique_names
 from rendergraph.compare.store import RUN, Failure, SweepFolder, locked
 from rendergraph.diff import diff
 from rendergraph.errors import InputError, Problem, UsageError
@@ -235,7 +235,7 @@ def _sweep_of_views(base: Pipeline, views: Sequence[View], out: Path, options: S
             count = partial(lambda done, number, _: report(done + number, space.count()), done)
             own = own.replace(resume=options.resume or bool(parts), progress=count)
             parts.append(sweep(base, part, out, reference, own))
-    order = {run_name(run): number for number, run in enumerate(space.runs())}
+    order = {name: number for number, name in enumerate(space.run_names())}
     comparisons = [part.comparison for part in parts]
     first = comparisons[0]
     comparison = replace(

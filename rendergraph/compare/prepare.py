@@ -285,13 +285,11 @@ def prepare(
     space.check()
     if views := by_view(space, reference, options):
         parts = [prepare(base, part, out, own_reference, own) for part, own_reference, own in views]
-        by_settings = {tuple(run.settings.items()): run for part in parts for run in part.runs}
-        named = zip(space.runs(), unique_names([run_name(run) for run in space.runs()]), strict=True)
-        ordered = [(by_settings.get(tuple(settings.items())), name) for settings, name in named]
-        found = [replace(run, name=name, folder=out / name) for run, name in ordered if run]
-        return replace(parts[0], runs=tuple(replace(run, number=at) for at, run in enumerate(found)), space=space)
-    combinations = space.runs()
-    names = unique_names([run_name(run) for run in combinations])
+        by_name = {run.name: run for part in parts for run in part.runs}
+        ordered = [by_name[name] for name in space.run_names() if name in by_name]
+        runs = tuple(replace(run, number=number) for number, run in enumerate(ordered))
+        return replace(parts[0], runs=runs, space=space)
+    combinations, names = space.runs(), space.run_names()
     base = measured_at(base, options.metric)
     reference_name = run_name({path: value for path, value in combinations[0].items() if path not in VIEW})
     if isinstance(reference, Pipeline):
@@ -325,7 +323,7 @@ def by_view(space: Space, reference: Path | Pipeline | None, options: SweepOptio
     scene_too = isinstance(reference, Pipeline)
     paths = [a.path for a in space.axes if a.path in VIEW or (scene_too and a.path.startswith("scene."))]
     groups: dict[tuple[tuple[str, str], ...], list[int]] = {}
-    runs = space.runs()
+    runs, names = space.runs(), space.run_names()
     for number, run in enumerate(runs):
         groups.setdefault(tuple((path, run[path]) for path in paths), []).append(number)
     if len(groups) < 2:
@@ -339,7 +337,7 @@ def by_view(space: Space, reference: Path | Pipeline | None, options: SweepOptio
     for view, numbers in groups.items():
         own, only = None if reference is None else reference.set(dict(view)), options.only
         places = None if only is None else [place for place, number in enumerate(numbers) if number in only]
-        part = replace(space, chosen=tuple(runs[number] for number in numbers))
+        part = replace(space, chosen=tuple(runs[n] for n in numbers), names=tuple(names[n] for n in numbers))
         views.append((part, own, options.replace(only=places)))
     return views
 

@@ -118,6 +118,7 @@ class Space:
         sampling: `latin`, one sample in each of `samples` equal parts of every axis; or `random`.
         seed: random seed of the samples.
         chosen: exactly these runs, as an optimiser asks for them.
+        names: those of the chosen runs, if they are part of a larger space.
     """
 
     axes: tuple[Axis, ...]
@@ -126,6 +127,7 @@ class Space:
     sampling: Sampling = "latin"
     seed: int = 0
     chosen: tuple[Mapping[str, str], ...] | None = field(default=None, compare=False)
+    names: tuple[str, ...] = field(default=(), compare=False)
 
     @classmethod
     def of(cls, axes: Axes, *, zipped: Sequence[Sequence[str]] = (), **sampling: Any) -> Space:
@@ -164,6 +166,10 @@ class Space:
         rows = itertools.product(*columns) if self.samples is None else zip(*columns, strict=True)
         runs = [{path: value for part in row for path, value in part.items()} for row in rows]
         return list({tuple(run.items()): run for run in runs}.values())
+
+    def run_names(self) -> list[str]:
+        """Return the name of every run, which no other run has."""
+        return list(self.names or unique_names([run_name(run) for run in self.runs()]))
 
     def _column(self, group: Sequence[Axis]) -> list[dict[str, str]]:
         paths = [axis.path for axis in group]

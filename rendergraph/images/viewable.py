@@ -146,8 +146,7 @@ def _colors(array: Pixels, semantic: str, *, light: bool) -> Bytes:
     finite = values[np.isfinite(values)]
     if semantic not in _UNIT and finite.size and finite.min() < 0:
         values = values if values.shape[-1] != 2 else np.concatenate([values, np.zeros_like(values[..., :1])], axis=-1)
-        size = np.abs(finite)
-        return to_bytes(values / (2 * (np.quantile(size, 0.99) or size.max())) + 0.5)
+        return to_bytes(values / (2 * (np.quantile(np.abs(finite), 0.99) or np.abs(finite).max())) + 0.5)
     if semantic not in _UNIT and finite.size and finite.max() > 1:
         return to_bytes(_stretched(values, background=math.inf, outside=0.01))
     return to_bytes(values)

@@ -210,12 +210,12 @@ class ViewState:
         }
 
     def follow(self) -> bool:
-        """Take over the opened file from the disk if it has changed since it was saved here and nothing else has."""
+        """Take over the text of the opened file from the disk if it has changed there alone; settings stay."""
         text = _read(self.file)
-        if not text or not self.is_behind or self.is_changed:
+        if not text or not self.is_behind or self.edits.text != self._disk:
             return False
-        self._disk, self.edits = text, replace(self.edits, text=text)
-        self._saved = self.edits.state
+        self._disk, self.edits = text, replace(self.edits, text=text, after=())
+        self._saved = text, self._saved[1]
         return True
 
     def record(self, response: Response) -> None:

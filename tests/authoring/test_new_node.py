@@ -80,8 +80,8 @@ def test_everything_works_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_a_package_can_be_built_and_found(tmp_path: Path) -> None:
     if find_spec("setuptools") is None or int(version("setuptools").split(".")[0]) < 77:
         pytest.skip("building without network needs setuptools 77 beside the tests")
-    made = new_node("lens_falloff", package=True, where=tmp_path)
-    assert Path("lens_falloff/.gitignore") in made.files
+    written = new_node("lens_falloff", package=True, where=tmp_path)
+    assert Path("lens_falloff/.gitignore") in written.files
     site = tmp_path / "site"
     words = f"-m pip install --quiet --no-deps --no-build-isolation --target {site} ."
     run(f"{sys.executable} {words}", tmp_path / "lens_falloff")

@@ -77,6 +77,12 @@ def test_environments_are_explained(cli: Any, name: str) -> None:
     assert "has no program" in cli("explain", name, "--glsl").err
 
 
+@pytest.mark.parametrize("topic", ["RG103", "scene"])
+def test_what_has_no_program_says_so(cli: Any, topic: str) -> None:
+    assert f"RG511 '{topic}' has no program" in cli("explain", topic, "--glsl").err
+    assert cli("explain", topic).code == 0
+
+
 def test_standard_input_is_a_pipeline_or_a_patch(cli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def typed(text: str, *words: str) -> Any:
         monkeypatch.setattr(sys, "stdin", TextIOWrapper(BytesIO(text.encode())))

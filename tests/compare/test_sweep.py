@@ -420,12 +420,20 @@ def test_runs_of_one_view_are_measured_as_in_the_whole_sweep(base: rg.Pipeline) 
     assert whole.runs[0].reference_key != whole.runs[2].reference_key
 
 
-def test_runs_of_two_views_whose_names_would_be_equal_have_folders_of_their_own(base: rg.Pipeline) -> None:
+def test_runs_of_two_views_whose_names_would_be_equal_have_folders_of_their_own(
+    base: rg.Pipeline, gl: rg.Session, tmp_path: Path
+) -> None:
     cameras = ["eye=0,1,5 target=0,0,0", "eye=0,1,5  target=0,0,0"]
+    names = ["camera=eye=0,1,5_target=0,0,0", "camera=eye=0,1,5_target=0,0,0-2"]
     runs = prepare(base, {"camera": cameras}, Path("out")).runs
-    assert [run.name for run in runs] == ["camera=eye=0,1,5_target=0,0,0", "camera=eye=0,1,5_target=0,0,0-2"]
-    assert [run.folder for run in runs] == [Path("out") / run.name for run in runs]
+    assert [run.name for run in runs] == names
+    assert [run.folder for run in runs] == [Path("out") / name for name in names]
     assert [run.settings["camera"] for run in runs] == cameras
+    (second,) = prepare(base, {"camera": cameras}, Path("out"), options=SweepOptions(only=(1,))).runs
+    assert (second.name, second.settings["camera"]) == (names[1], cameras[1])
+    found = sweep(base, {"camera": cameras}, tmp_path, frames=1, session=gl)
+    assert [result.name for result in found] == names
+    assert sorted(path.name for path in tmp_path.iterdir() if path.is_dir()) == names
 
 
 @pytest.mark.slow

@@ -128,6 +128,27 @@ def test_a_saved_file_is_followed_again(state: ViewState, folder: Path) -> None:
     assert state.is_behind
 
 
+def test_a_saved_file_is_followed_beside_changes_of_settings(state: ViewState, folder: Path) -> None:
+    insert_bloom(state)
+    text = state.save("mine.yaml", state.draft("mine.yaml")[2])
+    say(state, do="set", path="display.exposure", value=2)
+    (folder / "mine.yaml").write_text(text + "  light: {params: {ambient: 0.9}}\n")
+    assert state.follow()
+    assert state.is_changed
+    assert state.edits.current == {"display.exposure": "2"}
+    say(state, do="drop", path="display.exposure")
+    assert not state.is_changed
+
+
+def test_changes_that_were_saved_as_another_file_stay(state: ViewState, folder: Path) -> None:
+    insert_bloom(state)
+    state.save("other.yaml", state.draft("other.yaml")[2])
+    changed = state.edits.text
+    (folder / "mine.yaml").write_text(MINE + "  light: {params: {ambient: 0.9}}\n")
+    assert not state.follow()
+    assert (state.edits.text, state.is_behind) == (changed, True)
+
+
 def test_a_shipped_pipeline_is_extended(folder: Path) -> None:
     state = ViewState(rg.Selection("forward", size=(48, 27), sets=("light.ambient=0.1",)), folder)
     insert_bloom(state)

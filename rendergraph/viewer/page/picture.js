@@ -62,12 +62,13 @@ export function showPixel({ pixel }) {
 }
 
 const FACES = ["+x", "-x", "+y", "-y", "+z", "-z"];
-const LIGHT = ["radiance", "emissive", "luminance", "irradiance", "reflections"];  // shown with the slider's exposure
+const LIGHT = ["radiance", "emissive", "luminance", "irradiance", "reflections"];  // as _LIGHT in render_service.py
 
 // What can be chosen of the shown texture, and how it is shown.
 export function showLooking(pipeline, state) {
   const [base, part] = (state.port || "").split(/\[|\]/);
-  const [node, port] = (base || pipeline.graph.outputs[pipeline.outputs[0]] || "").split(".");
+  const ends = pipeline.graph.outputs;
+  const [node, port] = (base ? ends[base] ?? base : ends[pipeline.outputs[0]] ?? "").split(".");
   const output = pipeline.graph.nodes.find((one) => one.id === node)?.outputs[port];
   const layers = base ? (output?.kind === "texture_cube" ? 6 : output?.layers ?? 1) : 1;
   const mips = base ? output?.mips ?? 1 : 1;
