@@ -69,6 +69,18 @@ scene, camera = picture.scene, picture.request["camera"]
     return found
 
 
+def decoder(session: rg.Session, pipeline: rg.Pipeline) -> Any:
+    """Texels of a pipeline's scene; only a session has those of generated textures."""
+    with session.current():
+        drawing = session.compile(pipeline)
+
+    def decode(image: Any, srgb: bool) -> npt.NDArray[Any]:
+        with session.current():
+            return drawing.executable.scene.decode(image, srgb)
+
+    return decode
+
+
 # --- the surface -----------------------------------------------------------------------------------------------------
 
 MATERIALS: dict[str, dict[str, Any]] = {
@@ -309,10 +321,10 @@ def session() -> Any:
 
 def test_the_camera_sees_the_surfaces_of_the_g_buffer(session: rg.Session) -> None:
     pipeline = rg.load("deferred", scene="shapes", size=(96, 54))
-    window = pipeline.render(session=session, taps=["gbuffer.depth"])["gbuffer.depth"][..., 0].astype(np.float64)
+    window = pipeline.render(session=session, taps=["gbuffer.depth"])["gbuffer.depth"].astype(np.float64)
     scene = pipeline.link().scene
     view = view_matrices(next(iter(scene.cameras.values())), (96, 54))
-    points = in_mitsuba(scene, (96, 54), FIRST_HITS)["position"]
+    points = in_mitsuba(scene, (96, 54), FIRST_HITS, decode=decoder(session, pipeline))["position"]
     depth = -(np.concatenate([points, np.ones((54, 96, 1))], axis=-1) @ view.view.T)[..., 2]
     seen = np.linalg.norm(points, axis=-1) > 0
     expected = view.projection[2, 3] / (1 - 2 * window + view.projection[2, 2])
@@ -441,7 +453,8 @@ def test_the_path_tracer_agrees(session: rg.Session, shared: Path, scene: str, e
     pipeline = rg.load("path-traced", scene=source, environment=environment, size=size, sets=sets)
     frame = pipeline.render(session=session, outputs=["radiance", "variance"])
     ours, our_variance = (frame[name][..., :3].astype(np.float64) for name in ("radiance", "variance"))
-    light, error = trace(pipeline.link().scene, size, samples, bounces=bounces)
+    decode = decoder(session, pipeline)
+    light, error = trace(pipeline.link().scene, size, samples, bounces=bounces, decode=decode)
     variance = our_variance + error**2
     ceiling = np.percentile(variance, 99.5)  # single paths that found a lamp by chance say nothing
     calm = (variance <= ceiling).all(axis=-1, keepdims=True)
