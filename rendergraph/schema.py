@@ -59,7 +59,7 @@ def schema(catalog: Catalog, bases: Mapping[str, Mapping[str, str]] = {}, links:
             needed[name] = _needed(cls)
     found = file_schema(PIPELINE)
     found["properties"]["nodes"]["additionalProperties"] = {"$ref": "#/definitions/node"}
-    whole_node = {"if": _has("enabled", False), "else": {"allOf": _by_type(needed)}}  # with all inputs it needs
+    whole_node = {"if": _has("enabled", False), "else": {"allOf": _by_type(needed)}}  # all inputs, unless disabled
     found["definitions"] = {"node": _node(types, rules), "whole_node": whole_node}
     whole = {"properties": {"nodes": {"additionalProperties": {"$ref": "#/definitions/whole_node"}}}}
     # Files that extend others, and patches, need not connect everything; they lack one of these keys.

@@ -130,7 +130,7 @@ def allocate(schedule: Schedule, *, alias: bool = True, heap: bool = False) -> R
     alike = len({*sharing.classes.values()}) == len({*sharing.descs.values()})  # each class has one description
     by_class = by_desc if alike else sharing.colour(sharing.classes)
     groups = sharing.fewest_views(by_desc, by_class) if alias else [[id] for id in sharing.ids]
-    better: list[tuple[Tier, Groups]] = [] if alias else [("descriptor", by_desc), ("view", by_class)]  # tiers above
+    better: list[tuple[Tier, Groups]] = [] if alias else [("descriptor", by_desc), ("view", by_class)]  # higher tiers
     if len(sharing.ids) <= MOST_PLACED:
         blocks = sharing.blocks(by_desc)
         if not (alias and heap):

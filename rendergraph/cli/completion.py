@@ -35,10 +35,10 @@ def complete(kind: str, ctx: Context, incomplete: str) -> list[CompletionItem]:
 
 def _topics(ctx: Context, incomplete: str) -> list[str]:
     from rendergraph.catalog import Catalog
+    from rendergraph.pipelines.environments import SHIPPED
 
-    names = Catalog.discover(()).names()
-    shipped = {*shipped_pipelines(), *shipped_scenes(), *_environments(ctx, incomplete)}
-    return sorted({*names, *shipped, *reference.FILE_KINDS} - {"none"})
+    names = {*Catalog.discover(()).names(), *reference.FILE_KINDS}
+    return sorted({*names, *shipped_pipelines(), *shipped_scenes(), *SHIPPED})
 
 
 def _environments(ctx: Context, incomplete: str) -> Iterable[str]:

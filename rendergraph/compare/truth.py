@@ -154,8 +154,7 @@ def draw_truth(
     with gpu.current():
         drawing = stages.compile(stages.expand(planned.linked, options), gpu)
         drawing.begin(lead=0)
-    due, share, excess, samples, seconds = 1, 0.0, None, 0, 0.0
-    drawn = 0
+    drawn, due, share, excess, samples, seconds = 0, 1, 0.0, None, 0, 0.0
     while True:
         drawn += 1
         part = max(share * (drawn - 1) / due, seconds / limits.seconds)

@@ -67,7 +67,7 @@ class Recording:
     def run(self) -> str | None:
         """Call the node's `record`; return why the node is idle if it only leaves its inputs as they are."""
         node, ports = self.node, self.node.node.ports()
-        steps = Steps(ports, node.id, node.type.name, self)  # pyright: ignore[reportArgumentType]
+        steps = Steps(ports, node.id, node.type.name, self)  # pyright: ignore[reportArgumentType]  # cached facts
         try:
             _returns_nothing(node.node.record(steps))  # type: ignore[func-returns-value]  # third-party nodes may
         except InputError:

@@ -90,7 +90,7 @@ class Film:
                 pix_fmt_out=pixel_format,
                 macro_block_size=1,
                 quality=None,  # its default would overrule what `more` says
-                output_params=[*more],
+                output_params=list(more),
                 ffmpeg_log_level="error",
             )
             self._writer.send(None)

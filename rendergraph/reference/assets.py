@@ -68,7 +68,7 @@ def describe_scene(name: str, path: Path, scene: Scene) -> dict[str, Any]:
         "line": opening(path) if path.suffix.lower() in _YAML else "",
         "file": str(path),
         "triangles": sum(triangles[one.mesh] for one in scene.objects),
-        "bounds": [[round(value, 4) + 0.0 for value in corner] for corner in scene.bounds],
+        "bounds": [[round(value, 4) + 0.0 for value in corner] for corner in scene.bounds],  # 0, not -0
         "objects": [
             {
                 "name": one.name,

@@ -132,6 +132,7 @@ class RenderService:
             "number": frame.number,
             "port": request.port,
             "mapping": mapping,
+            "is_light": rendered.info.semantic in _LIGHT,
             "passes": self._passes(rendered),
             "frame_ms": frame.frame_ms["median"],
             "device": dict(frame.device),

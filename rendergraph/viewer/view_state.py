@@ -211,8 +211,7 @@ class ViewState:
 
     def follow(self) -> bool:
         """Take over the text of the opened file from the disk if it has changed there alone; settings stay."""
-        text = _read(self.file)
-        if not text or not self.is_behind or self.edits.text != self._disk:
+        if not self.is_behind or self.edits.text != self._disk or not (text := _read(self.file)):
             return False
         self._disk, self.edits = text, replace(self.edits, text=text, after=())
         self._saved = text, self._saved[1]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import rendergraph as rg
 import rendergraph.catalog
 from rendergraph.catalog import Catalog
 from rendergraph.errors import InputError
@@ -229,3 +230,19 @@ def test_text_with_a_comma_within_braces_is_told_from_a_key(tmp_path: Path) -> N
         InputError, match=r"dim\.frag:2:35: RG440 'but darker.' is read as a key; put text with a comma"
     ):
         Catalog.discover([file], installed=False).get("dim")
+
+
+def test_a_class_that_is_defined_again_replaces_the_loaded_one() -> None:
+    def cell(text: str) -> type[rg.api.Node]:
+        class Flat(rg.api.Node):
+            __doc__ = text
+            values = rg.api.Output(rg.api.Radiance, doc="The value.")
+
+        return Flat
+
+    before, after = cell("One."), cell("Two.")
+    catalog = Catalog({}).with_classes({"flat": before})
+    loaded = catalog.get("flat")
+    assert loaded.cls is before
+    assert catalog.with_classes({"flat": before}).get("flat") is loaded
+    assert catalog.with_classes({"flat": after}).get("flat").cls is after

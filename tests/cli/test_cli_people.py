@@ -252,6 +252,7 @@ def test_bash_completes_what_is_typed(tmp_path: Path) -> None:
         "rendergraph run forward --camera ": "main",
         "rendergraph run forward --environment st": "studio",
         "rendergraph explain corn": "cornell_box",
+        "rendergraph explain non": "",  # `none` is a choice of environment alone
         "rendergraph nodes dis": "display",
         "rendergraph run nothing -s ": "",
     }

@@ -152,6 +152,7 @@ on("picture", (facts, files) => {
   showProblems();
   showPicture(facts, files);
   $("mapping").textContent = facts.mapping;
+  $("exposure-label").hidden = !facts.is_light;
   showFigures();
   if (!facts.still) return;
   times = Object.fromEntries(facts.passes.map((pass) => [pass.node, pass.gpu_ms ?? pass.cpu_ms]));

@@ -190,7 +190,7 @@ function surroundings(pipeline, edits, { scenes = [], environments = [] }) {
     name.required = true;  // only now: an empty field is no mistake before
     if (name.reportValidity()) send({ do: "keep_view", name: name.value });
   } }, "Keep view");
-  const name = h("input", { type: "text", id: "p-view-name", size: 8, pattern: "[A-Za-z_][A-Za-z0-9_\\-]*", title: "A letter, then letters, digits, _ or -", placeholder: "name", "aria-label": "Name of the view to keep" });
+  const name = h("input", { type: "text", id: "p-view-name", size: 8, pattern: "[A-Za-z_][A-Za-z0-9_\\-]*", title: "A letter or _, then letters, digits, _ or -", placeholder: "name", "aria-label": "Name of the view to keep" });
   return [
     chooser("scene", scenes, pipeline.scene, "What is drawn."),
     chooser("environment", environments, pipeline.environment, "The light from all around."),

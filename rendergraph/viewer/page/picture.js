@@ -62,20 +62,17 @@ export function showPixel({ pixel }) {
 }
 
 const FACES = ["+x", "-x", "+y", "-y", "+z", "-z"];
-const LIGHT = ["radiance", "emissive", "luminance", "irradiance", "reflections"];  // as _LIGHT in render_service.py
 
 // What can be chosen of the shown texture, and how it is shown.
 export function showLooking(pipeline, state) {
   const [base, part] = (state.port || "").split(/\[|\]/);
-  const ends = pipeline.graph.outputs;
-  const [node, port] = (base ? ends[base] ?? base : ends[pipeline.outputs[0]] ?? "").split(".");
+  const [node, port] = (base || pipeline.graph.outputs[pipeline.outputs[0]] || "").split(".");
   const output = pipeline.graph.nodes.find((one) => one.id === node)?.outputs[port];
   const layers = base ? (output?.kind === "texture_cube" ? 6 : output?.layers ?? 1) : 1;
   const mips = base ? output?.mips ?? 1 : 1;
   const layer = /^\d+/.exec(part ?? "")?.[0] ?? "", mip = /mip=(\d+)/.exec(part ?? "")?.[1] ?? "0";
   $("layer").parentElement.hidden = !(layers > 1);
   $("mip").parentElement.hidden = !(mips > 1);
-  $("exposure-label").hidden = !LIGHT.includes(output?.semantic);
   choices($("layer"), ["", ...Array(layers).keys()].map(String), layer, (name) => (name === "" ? "all" : output?.kind === "texture_cube" ? FACES[name] : name));
   choices($("mip"), [...Array(mips).keys()].map(String), mip);
   const look = () => {
