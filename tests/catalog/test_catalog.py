@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-import rendergraph as rg
 import rendergraph.catalog
+from rendergraph.api import Node, Output, Radiance
 from rendergraph.catalog import Catalog
 from rendergraph.errors import InputError
 
@@ -233,10 +233,10 @@ def test_text_with_a_comma_within_braces_is_told_from_a_key(tmp_path: Path) -> N
 
 
 def test_a_class_that_is_defined_again_replaces_the_loaded_one() -> None:
-    def cell(text: str) -> type[rg.api.Node]:
-        class Flat(rg.api.Node):
+    def cell(text: str) -> type[Node]:
+        class Flat(Node):
             __doc__ = text
-            values = rg.api.Output(rg.api.Radiance, doc="The value.")
+            values = Output(Radiance, doc="The value.")
 
         return Flat
 
