@@ -28,7 +28,7 @@ GROUPS = {
         "shading lighting lights radiance air environment_lighting environment equirectangular cube brdf "
         "brdf_table anisotropic_ggx disc_form_factor"
     ),
-    "The scene as data": "scene previous_scene trace ray_query trace_tree",
+    "The scene as data": "scene previous_scene trace ray_query trace_tree trace_triangle",
     "Vertex shaders": "transform geometry_vertex material_vertex mask_vertex",
     "Colour and numbers": (
         "srgb luminance color_temperature layer_colors math noise hammersley ray_directions downsample text"

@@ -20,7 +20,7 @@ from rendergraph.compile.bindings import Units, ViewBuffers
 from rendergraph.compile.checks import ProgramChecks, attribute_formats, check_attributes, layout_for
 from rendergraph.compile.executable import CompiledStep, Draw, Executable, SortedDraws, prefixed_reads, step_uniforms
 from rendergraph.compile.geometry import GeometryCompiler, MultiDraw, MultiDrawKey
-from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES, SCENE_ATTRIBUTES, TEXELS, GpuScene
+from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES, SCENE_ATTRIBUTES, TEXELS, TREE, GpuScene
 from rendergraph.compile.memory import Call, Memory, Region, TexturePool, clear_target
 from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.transfers import UploadedValues, clear_buffer, image_calls, transfer_calls
@@ -43,6 +43,7 @@ from rendergraph.textures import FORMATS, TextureDesc
 
 _ALL_BARRIERS = 0xFFFFFFFF
 _DRAW_INDIRECT_BUFFER, _PARAMETER_BUFFER, _UNSIGNED_INT = 0x8F3F, 0x80EE, 0x1405
+_READ_RGBA32I = 0x88B8, 0x8D82
 _COMMAND_BYTES = 20  # of a draw command, with a last integer that is ignored without indices
 _TEXTURE_2D, _DEPTH_BOUNDS_TEST, _CLIP_DISTANCE0 = 0x0DE1, 0x8890, 0x3000
 
@@ -359,7 +360,10 @@ class _Compiler(Struct, eq=False, dict=True):
         for name in sorted(TEXELS & program.uniforms.keys()):
             check_scene_includes(step, texts(), self.types)
             sampled.add(name)
-            uniforms[name] = self.units.unit((self.scene.texels(name),), 0, binds)
+            texture, images = self.scene.texels(name), sum(use.use == "image" for use in (*step.reads, *step.writes))
+            if name == TREE:  # an image, after those of the step
+                binds.append(partial(self.device.raw.glBindImageTexture, images, texture, 0, 0, 0, *_READ_RGBA32I))
+            uniforms[name] = images if name == TREE else self.units.unit((texture,), 0, binds)
         cls, resources, sampled = self.types[step.node].cls, self.plan.resources, {*sampled, *materials}
         check_kept_text(step, texts, cls, resources)
         ProgramChecks(step, program, texts, cls, resources, uniforms, blocks, sampled).run()

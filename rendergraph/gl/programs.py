@@ -37,7 +37,7 @@ _VALUES = {  # GL type: name in GLSL, ending of the `glProgramUniform…` that w
 _SAMPLERS = {
     0x8B5D: "sampler1D", 0x8B5E: "sampler2D", 0x8B5F: "sampler3D", 0x8B60: "samplerCube", 0x8B62: "sampler2DShadow",
     0x8DC1: "sampler2DArray", 0x8DC4: "sampler2DArrayShadow", 0x8DC5: "samplerCubeShadow", 0x8DCA: "isampler2D",
-    0x8DCB: "isampler3D", 0x8DD3: "usampler3D", 0x8DD0: "isamplerBuffer",
+    0x8DCB: "isampler3D", 0x8DD3: "usampler3D", 0x8DD0: "isamplerBuffer", 0x905C: "iimageBuffer",
     0x8DCC: "isamplerCube", 0x8DCF: "isampler2DArray", 0x8DD2: "usampler2D", 0x8DD4: "usamplerCube",
     0x8DD7: "usampler2DArray", 0x9108: "sampler2DMS", 0x9109: "isampler2DMS", 0x910A: "usampler2DMS",
     0x910B: "sampler2DMSArray", 0x910C: "isampler2DMSArray", 0x910D: "usampler2DMSArray",

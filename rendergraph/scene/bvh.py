@@ -56,8 +56,8 @@ def leaf(first: npt.NDArray[np.int64] | int, count: npt.NDArray[np.int64] | int)
 
 
 def depth_limit(primitives: int) -> int:
-    """Return the largest depth of a tree over this many primitives, whatever their boxes; it bounds the stack."""
-    return max(primitives - 1, 0).bit_length() + _SLACK
+    """Return the largest depth of a tree over this many primitives, whatever their boxes; a ray's trail has 30 bits."""
+    return min(max(primitives - 1, 0).bit_length() + _SLACK, 30)
 
 
 def triangle_boxes(positions: Floats, triangles: npt.NDArray[np.uint32]) -> Floats:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from rendergraph.facts import SceneDataFacts
 from rendergraph.scene.model import ImageSource, Scene, Texture
 from rendergraph.scene.pack import SLOTS, PackedScene, Records, slot_count
-from rendergraph.scene.tree_data import most_bytes, stack_size
+from rendergraph.scene.tree_data import most_bytes
 from rendergraph.textures import FORMATS, TextureDesc
 
 _FLAGS = (
@@ -41,6 +41,7 @@ _OPTIONAL = {"tangents": 4, "uv0": 2, "uv1": 2, "colors": 4}
 
 MOST_ARRAYS = 5
 """Maximum number of texture arrays of a scene, so that they fit into a stage's 16 units with a step's textures."""
+_WORTH = 1 << 22  # bytes that one array less may add
 BORDER = 1
 """Texels of border around an image in its layer, which continue it by its wrap modes, for filtering."""
 _WRAPS = ("repeat", "mirror", "clamp")
@@ -53,8 +54,9 @@ Stored: TypeAlias = tuple[ImageSource, bool, str, str]
 class TextureArrays(NamedTuple):
     """The arrays for a scene's textures, the array and layer of each, and the number smaller than their layer.
 
-    Textures with the same format and size share an array. If that gives more than `MOST_ARRAYS`, arrays of the same
-    format are merged, those first that add the fewest bytes: a smaller image then fills a corner of its layer.
+    Textures with the same format and size share an array. Arrays of the same format are merged, those first that add
+    the fewest bytes, while this adds few or there are more than `MOST_ARRAYS`: a smaller image then fills a corner of
+    its layer. Shaders sample all arrays of a slot, one after the other.
     """
 
     arrays: tuple[TextureDesc, ...]
@@ -90,9 +92,10 @@ def texture_arrays(descs: Mapping[Stored, TextureDesc]) -> TextureArrays:
     groups: dict[tuple[str, int, int], list[Stored]] = {}
     for key, desc in descs.items():
         groups.setdefault((desc.format, desc.width, desc.height), []).append(key)
-    while len(groups) > MOST_ARRAYS:
-        pairs = [pair for pair in combinations(groups, 2) if pair[0][0] == pair[1][0]]
+    while pairs := [pair for pair in combinations(groups, 2) if pair[0][0] == pair[1][0]]:
         one, other = min(pairs, key=lambda pair: _added_bytes(pair, groups))
+        if len(groups) <= MOST_ARRAYS and _added_bytes((one, other), groups) > _WORTH:
+            break
         joined = groups.pop(one) + groups.pop(other)
         groups.setdefault((one[0], max(one[1], other[1]), max(one[2], other[2])), []).extend(joined)
     arrays = [
@@ -178,7 +181,6 @@ def data_macros(scene: Scene, packed: PackedScene, arrays: TextureArrays) -> dic
         "SCENE_INSTANCE_COUNT": str(len(scene.objects)),
         "SCENE_TRIANGLE_COUNT": str(facts.triangles),
         "SCENE_EMITTER_COUNT": str(facts.emitters),
-        "TRACE_STACK": str(stack_size(scene)),
         **{f"SCENE_{name.upper()}": str(bit) for name, bit in FLAGS.items()},
     }
     used_streams = [name for name in _OPTIONAL if getattr(packed, name) is not None]

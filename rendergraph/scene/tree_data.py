@@ -29,7 +29,7 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
 
-from rendergraph.scene.bvh import LEAF, Tree, build, depth_limit, refit, triangle_boxes
+from rendergraph.scene.bvh import LEAF, Tree, build, refit, triangle_boxes
 from rendergraph.scene.model import Floats, Matrix, Scene
 from rendergraph.scene.pack import Ints, PackedScene
 
@@ -84,12 +84,6 @@ def _most_triangles(scene: Scene) -> int:
 def most_bytes(scene: Scene) -> int:
     """Return an upper bound on the buffer's bytes, known before any tree is built."""
     return 16 * (first_rows(len(scene.objects)) + (_NODE + _TRIANGLE) * _most_triangles(scene))
-
-
-def stack_size(scene: Scene) -> int:
-    """Return an upper bound on the entries of a traversal's stack, known before any tree is built."""
-    depths = depth_limit(len(scene.objects)) + depth_limit(_most_triangles(scene))
-    return depths + 3  # end, way back to the objects, one more
 
 
 def _moving(scene: Scene) -> set[int]:

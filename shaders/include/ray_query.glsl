@@ -3,8 +3,9 @@
 // objects and triangles, and `rendergraph/scene/tree_data.py` describes their buffer.
 #include <scene.glsl>
 
-uniform isamplerBuffer scene_tree;
-#define SCENE_TREE(row) texelFetch(scene_tree, row)
+// An image, because llvmpipe compiles loads from images into the shader, and calls a function to fetch from samplers.
+layout(rgba32i) readonly restrict uniform iimageBuffer scene_tree;
+#define SCENE_TREE(row) imageLoad(scene_tree, row)
 
 struct Hit {
     float distance;     // along the direction, in units of its length
@@ -13,16 +14,17 @@ struct Hit {
     vec2 barycentrics;  // weights of the second and third vertex
 };
 
-const int TRACE_UP = 0x7ffffffe;   // on the stack: back from a mesh to the tree over objects
-const int TRACE_END = 0x7fffffff;  // the traversal has ended
+const int TRACE_UP = 0x7ffffffd;    // a node that stands for: back from a mesh to the tree over objects
+const int TRACE_NONE = 0x7ffffffe;  // an empty entry of the stack
+const int TRACE_END = 0x7fffffff;   // the traversal has ended
+const int TRACE_ROOT = 1 << 30;     // the level of a root; a node's children are at half its level
+const int TRACE_STACK = 6;
 
 // 1 / d for each component of `d`, and a large number of its sign where it is almost 0.
 vec3 trace_inverse(vec3 d) {
     vec3 least = mix(vec3(1e-30), vec3(-1e-30), lessThan(d, vec3(0.0)));
     return 1.0 / mix(d, least, lessThan(abs(d), vec3(1e-30)));
 }
-
-int trace_stack[TRACE_STACK];  // of the current query; in a structure it would be copied with each call
 
 // The state of a query. An invocation can have one at a time.
 struct RayQuery {
@@ -31,14 +33,21 @@ struct RayQuery {
     vec3 origin;
     vec3 direction;
     float nearest;
-    float reach;    // hits farther away are ignored
     int wanted;     // flags of surfaces to hit: all of these
     int rejected;   // and none of these
     int asks;
     bool any;       // the traversal ends at the first hit that is accepted
-    // State of the traversal: the node, the top of the stack, and the ray on the grid of the tree and in the object.
+    // State of the traversal: where it is, and the ray on the grid of the tree and in the object. `trail` has the bit of
+    // each level of the path to `node` where no child remains to be visited later.
     int node;
-    int top;
+    int level;
+    int trail;
+    int leaf;                // below 0: triangles that wait to be tested
+    int stack[TRACE_STACK];  // the last children that remain, the last one first
+    int root;
+    int after;               // the node after this tree
+    int outer_level;         // of the object, in the tree over objects
+    int outer_trail;
     bool in_mesh;
     vec3 grid_origin;
     vec3 inverse;
@@ -58,7 +67,6 @@ RayQuery ray_query(
     q.origin = origin;
     q.direction = direction;
     q.nearest = nearest;
-    q.reach = farthest;
     q.wanted = wanted;
     q.rejected = rejected;
     q.asks = asks;
@@ -68,8 +76,11 @@ RayQuery ray_query(
     // box.
     bool is_ray = dot(abs(origin) + abs(direction), vec3(1.0)) < 1e30;
     q.node = header2.w > 0 && is_ray ? header.w : TRACE_END;
-    trace_stack[0] = TRACE_END;
-    q.top = 1;
+    q.level = TRACE_ROOT;
+    q.trail = q.leaf = q.outer_level = q.outer_trail = 0;
+    for (int i = 0; i < TRACE_STACK; ++i) q.stack[i] = TRACE_NONE;
+    q.root = header.w;
+    q.after = TRACE_END;
     q.in_mesh = false;
     q.grid_origin = (origin - intBitsToFloat(header.xyz)) * intBitsToFloat(header2.xyz);
     q.inverse = trace_inverse(direction * intBitsToFloat(header2.xyz));
@@ -82,6 +93,8 @@ RayQuery ray_query(
 // Accepts the candidate of the query `q`.
 void accept_candidate(inout RayQuery q) {
     q.hit = q.candidate;
-    q.reach = q.candidate.distance;
-    if (q.any) q.node = TRACE_END;
+    if (q.any) {
+        q.node = TRACE_END;
+        q.leaf = 0;
+    }
 }

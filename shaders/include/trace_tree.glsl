@@ -1,121 +1,127 @@
 // Traversal of the trees over objects and triangles. `trace.glsl` has the queries for shaders to call.
-#include <ray_query.glsl>
+#include <trace_triangle.glsl>
 
-// The axes in an order that ends with `last`, without mirroring.
-vec3 trace_permuted(vec3 v, int last) {
-    return last == 2 ? v : last == 0 ? v.yzx : v.zxy;
+// Moves on from a subtree, if it `ends`: to the child that was to be visited later, the deepest one that remains. A
+// `pushed` child is kept, if the node `pushes` one.
+void trace_next(inout RayQuery q, bool ends, bool pushes, int pushed) {
+    int trail = (q.trail & -q.level) + q.level;  // sets the lowest bit that is 0, from the level on
+    bool is_done = trail >= TRACE_ROOT, is_lost = q.stack[0] == TRACE_NONE;
+    q.node = ends ? (is_done ? q.after : is_lost ? q.root : q.stack[0]) : q.node;
+    q.trail = ends ? trail : q.trail;
+    q.level = ends ? (is_lost ? TRACE_ROOT : trail & -trail) : q.level;
+    for (int i = 0; i < TRACE_STACK; ++i) {
+        int entry = q.stack[i], below = i + 1 < TRACE_STACK ? q.stack[i + 1] : TRACE_NONE;
+        q.stack[i] = pushes ? pushed : ends && !is_done ? below : entry;
+        pushed = entry;
+    }
 }
 
-// Continues the query `q`: true where it has stopped at a candidate, false where it has ended. The triangle test is
-// that of S. Woop, C. Benthin and I. Wald ("Watertight Ray/Triangle Intersection", 2013): no ray passes between two
-// triangles that share an edge.
+// Visits an inner node of the tree: goes on to its nearer child that the ray hits before `reach`. Distances are compared
+// as integers, which takes a third of the operations on llvmpipe. Those below 0 are then in the wrong order, which does
+// not matter.
+void trace_visit(inout RayQuery q, float reach) {
+    bool is_inner = uint(q.node) < uint(TRACE_UP);
+    ivec4 low = SCENE_TREE(q.node), high = SCENE_TREE(q.node + 1);  // zeros outside of the buffer
+    ivec3 a = floatBitsToInt((vec3(low.xyz & 0xFFFF) - q.grid_origin) * q.inverse);
+    ivec3 b = floatBitsToInt((vec3(high.xyz & 0xFFFF) - q.grid_origin) * q.inverse);
+    ivec3 c = floatBitsToInt((vec3((low.xyz >> 16) & 0xFFFF) - q.grid_origin) * q.inverse);
+    ivec3 d = floatBitsToInt((vec3((high.xyz >> 16) & 0xFFFF) - q.grid_origin) * q.inverse);
+    int begin = floatBitsToInt(q.nearest), end = floatBitsToInt(reach);
+    const int ROUNDING = 12;  // steps of a float's precision
+    ivec3 enter = min(a, b), leave = max(a, b);
+    int left_enter = max(max(enter.x, enter.y), max(enter.z, begin));
+    bool left = left_enter <= min(min(leave.x, leave.y), min(leave.z, end)) + ROUNDING;
+    enter = min(c, d);
+    leave = max(c, d);
+    int right_enter = max(max(enter.x, enter.y), max(enter.z, begin));
+    bool right = right_enter <= min(min(leave.x, leave.y), min(leave.z, end)) + ROUNDING;
+
+    bool both = left && right, right_first = right && (!left || right_enter < left_enter);
+    // After a restart, `trail` has bits below the level: the way down to the lowest one leads to what was lost.
+    int child_level = q.level >> 1, ahead = q.trail & (q.level - 1);
+    bool is_first = ahead < child_level;  // otherwise the nearer child has been visited
+    bool ends = is_inner && !both && (!(left || right) || ahead == child_level);
+    bool descends = is_inner && !ends;
+    int nearer = right_first ? high.w : low.w, farther = right_first ? low.w : high.w;
+    q.node = descends ? (both && !is_first ? farther : nearer) : q.node;
+    trace_next(q, ends, descends && both && is_first, farther);
+    q.trail |= descends && !both ? child_level : 0;
+    q.level = descends ? child_level : q.level;
+}
+
+// Goes from the tree over objects into that of the object `q.node`, if its flags are those that the query wants.
+void trace_enter(inout RayQuery q) {
+    q.instance = -1 - q.node;
+    int at = 2 + 5 * q.instance;
+    ivec4 r0 = SCENE_TREE(at), r1 = SCENE_TREE(at + 1), r2 = SCENE_TREE(at + 2);
+    ivec4 low = SCENE_TREE(at + 3), scale = SCENE_TREE(at + 4);
+    vec4 m0 = intBitsToFloat(r0), m1 = intBitsToFloat(r1), m2 = intBitsToFloat(r2), o = vec4(q.origin, 1.0);
+    q.object_origin = vec3(dot(m0, o), dot(m1, o), dot(m2, o));
+    vec3 d = vec3(dot(m0.xyz, q.direction), dot(m1.xyz, q.direction), dot(m2.xyz, q.direction));
+    vec3 size = abs(d);
+    q.axis = size.x > size.y && size.x > size.z ? 0 : size.y > size.z ? 1 : 2;
+    vec3 permuted = trace_permuted(d, q.axis);
+    q.shear = vec3(permuted.xy, 1.0) / permuted.z;
+    q.flags = scale.w;  // below 0 for the shared tree, whose triangles have the flags
+    bool is_wanted = q.flags < 0 || ((q.flags & q.wanted) == q.wanted && (q.flags & q.rejected) == 0);
+    q.outer_level = q.level;
+    q.outer_trail = q.trail;
+    q.after = (q.trail & -q.level) + q.level >= TRACE_ROOT ? TRACE_END : TRACE_UP;  // no way back from the last one
+    q.node = is_wanted ? low.w : q.after;
+    if (is_wanted) {
+        q.grid_origin = (q.object_origin - intBitsToFloat(low.xyz)) * intBitsToFloat(scale.xyz);
+        q.inverse = trace_inverse(d * intBitsToFloat(scale.xyz));
+        q.in_mesh = true;
+        q.root = low.w;
+        q.trail = 0;
+        q.level = TRACE_ROOT;
+    }
+}
+
+// Whether the query has something to do in the current tree.
+bool is_in_tree(RayQuery q) {
+    return q.leaf < 0 || (q.node < TRACE_UP && (q.node >= 0 || q.in_mesh));
+}
+
+// Continues the query `q`: true where it has stopped at a candidate, false where it has ended.
 //
-// Each iteration of the inner loop visits two nodes and tests a triangle, and invocations leave it only at the end of
-// the tree. Those that run in lockstep then do the same work most of the time, and the set of active ones seldom
-// changes, so llvmpipe's branches are predictable. The stack cannot overflow: depths of trees are limited when they are
-// built, and TRACE_STACK follows from the limits.
+// The stack is so short that it fits into registers, because elements of arrays are slow to address on llvmpipe. Where
+// more children remain than it holds, the traversal restarts at the root, and a bit per level says which way to take
+// (S. Laine, "Restart Trail for Stackless BVH Traversal", 2010). This needs no more than 30 levels.
+//
+// Each iteration of the inner loop tests a triangle and visits three nodes, and invocations leave it only at the end of
+// the tree. A leaf waits for the next iteration while the traversal goes on (T. Aila and S. Laine, "Understanding the
+// Efficiency of Ray Traversal on GPUs", 2009). Invocations that run in lockstep then do the same work most of the time.
 bool find_candidate(inout RayQuery q) {
     ivec4 header = SCENE_TREE(0), header2 = SCENE_TREE(1);
     vec3 top_origin = (q.origin - intBitsToFloat(header.xyz)) * intBitsToFloat(header2.xyz);
     vec3 top_inverse = trace_inverse(q.direction * intBitsToFloat(header2.xyz));
-    int node = q.node, top = q.top, after = TRACE_END;
     bool stops = false;
     do {
-        if (node == TRACE_UP) {
+        if (q.node == TRACE_UP && q.leaf == 0) {
             q.in_mesh = false;
             q.grid_origin = top_origin;
             q.inverse = top_inverse;
-            --top;
-            node = trace_stack[top];
+            q.root = header.w;
+            q.after = TRACE_END;
+            q.level = q.outer_level;
+            q.trail = q.outer_trail;
+            trace_next(q, true, false, 0);
         }
-        if (node < 0 && !q.in_mesh) {  // an object
-            q.instance = -1 - node;
-            int at = 2 + 5 * q.instance;
-            ivec4 r0 = SCENE_TREE(at), r1 = SCENE_TREE(at + 1), r2 = SCENE_TREE(at + 2);
-            ivec4 low = SCENE_TREE(at + 3), scale = SCENE_TREE(at + 4);
-            vec4 m0 = intBitsToFloat(r0), m1 = intBitsToFloat(r1), m2 = intBitsToFloat(r2), o = vec4(q.origin, 1.0);
-            q.object_origin = vec3(dot(m0, o), dot(m1, o), dot(m2, o));
-            vec3 d = vec3(dot(m0.xyz, q.direction), dot(m1.xyz, q.direction), dot(m2.xyz, q.direction));
-            vec3 size = abs(d);
-            q.axis = size.x > size.y && size.x > size.z ? 0 : size.y > size.z ? 1 : 2;
-            vec3 permuted = trace_permuted(d, q.axis);
-            q.shear = vec3(permuted.xy, 1.0) / permuted.z;
-            q.flags = scale.w;  // below 0 for the shared tree, whose triangles have the flags
-            bool is_wanted = q.flags < 0 || ((q.flags & q.wanted) == q.wanted && (q.flags & q.rejected) == 0);
-            int next = trace_stack[max(top - 1, 0)];
-            bool is_last = next == TRACE_END;  // so there is no way back
-            if (is_wanted) {
-                q.grid_origin = (q.object_origin - intBitsToFloat(low.xyz)) * intBitsToFloat(scale.xyz);
-                q.inverse = trace_inverse(d * intBitsToFloat(scale.xyz));
-                q.in_mesh = true;
-            }
-            trace_stack[top] = TRACE_UP;
-            top += is_wanted ? (is_last ? 0 : 1) : -1;
-            node = is_wanted ? low.w : next;
-        }
+        if (q.node < 0 && !q.in_mesh) trace_enter(q);
         do {
-            vec3 a, b, c, d;
-            int next;
-            for (int k = 0; k < 2; ++k) {
-                bool is_inner = uint(node) < uint(TRACE_UP);
-                int row = is_inner ? node : 0;
-                ivec4 low = SCENE_TREE(row), high = SCENE_TREE(row + 1);
-                a = (vec3(low.xyz & 0xFFFF) - q.grid_origin) * q.inverse;
-                b = (vec3(high.xyz & 0xFFFF) - q.grid_origin) * q.inverse;
-                c = (vec3((low.xyz >> 16) & 0xFFFF) - q.grid_origin) * q.inverse;
-                d = (vec3((high.xyz >> 16) & 0xFFFF) - q.grid_origin) * q.inverse;
-                vec3 enter = min(a, b), leave = max(a, b);
-                float left_enter = max(max(enter.x, enter.y), max(enter.z, q.nearest));
-                float left_leave = min(min(leave.x, leave.y), min(leave.z, q.reach));
-                enter = min(c, d);
-                leave = max(c, d);
-                float right_enter = max(max(enter.x, enter.y), max(enter.z, q.nearest));
-                float right_leave = min(min(leave.x, leave.y), min(leave.z, q.reach));
-                bool left = left_enter <= left_leave * 1.000001, right = right_enter <= right_leave * 1.000001;
-                bool right_first = right && (!left || right_enter < left_enter);
-                trace_stack[top] = right_first ? low.w : high.w;
-                next = trace_stack[max(top - 1, 0)];
-                next = left || right ? (right_first ? high.w : low.w) : next;
-                top += !is_inner ? 0 : left && right ? 1 : left || right ? 0 : -1;
-                node = is_inner ? next : node;
+            // This is always true, but needed: for invocations that have left a loop, llvmpipe computes all values again
+            // that are not assigned in a branch.
+            if (!stops && is_in_tree(q)) {
+                bool is_leaf = q.node < 0 && q.in_mesh && q.leaf == 0;
+                q.leaf = is_leaf ? q.node : q.leaf;
+                trace_next(q, is_leaf, false, 0);
+                float reach = q.hit.distance;  // before the test, so that processors do both at the same time
+                stops = trace_triangle(q, header2.w);
+                for (int i = 0; i < 3; ++i) trace_visit(q, reach);
             }
-
-            bool is_leaf = node < 0 && q.in_mesh;
-            int leaf = is_leaf ? -1 - node : 0, at = header2.w + 3 * (leaf >> 2);
-            ivec4 first = SCENE_TREE(at), second = SCENE_TREE(at + 1), third = SCENE_TREE(at + 2);
-            // Triangles must compute the same numbers for a shared edge: no fused multiply-add is allowed.
-            precise vec3 p0 = trace_permuted(intBitsToFloat(first.xyz) - q.object_origin, q.axis);
-            precise vec3 p1 = trace_permuted(intBitsToFloat(second.xyz) - q.object_origin, q.axis);
-            precise vec3 p2 = trace_permuted(intBitsToFloat(third.xyz) - q.object_origin, q.axis);
-            p0.xy -= q.shear.xy * p0.z;
-            p1.xy -= q.shear.xy * p1.z;
-            p2.xy -= q.shear.xy * p2.z;
-            precise vec3 edges =
-                vec3(p2.x * p1.y - p2.y * p1.x, p0.x * p2.y - p0.y * p2.x, p1.x * p0.y - p1.y * p0.x);
-            float sum = edges.x + edges.y + edges.z, over = 1.0 / sum;
-            bool inside = all(greaterThanEqual(edges, vec3(0.0))) || all(lessThanEqual(edges, vec3(0.0)));
-            float distance = dot(edges, vec3(p0.z, p1.z, p2.z)) * q.shear.z * over;
-            int own = third.w < 0 ? q.flags : third.w;
-            bool is_hit = is_leaf && inside && sum != 0.0 && distance > q.nearest && distance < q.reach
-                && (own & q.wanted) == q.wanted && (own & q.rejected) == 0;
-            next = trace_stack[max(top - 1, 0)];
-            bool is_last = (leaf & 3) == 0;
-            top -= is_leaf && is_last ? 1 : 0;
-            node = !is_leaf ? node : is_last ? next : node - 3;  // a leaf of the others
-            if (is_hit) {
-                q.candidate = Hit(distance, third.w < 0 ? q.instance : second.w, first.w, edges.yz * over);
-                stops = (own & q.asks) != 0;
-                after = stops ? node : TRACE_END;
-                if (!stops) {
-                    q.hit = q.candidate;
-                    q.reach = distance;
-                }
-                node = stops || q.any ? TRACE_END : node;
-            }
-        } while (node < TRACE_UP && (node >= 0 || q.in_mesh));
-    } while (node != TRACE_END);
-    q.node = after;
-    q.top = top;
+        } while (!stops && is_in_tree(q));
+    } while (!stops && q.node != TRACE_END);
     return stops;
 }
 

@@ -219,6 +219,33 @@ def test_rays_find_what_a_search_over_all_triangles_finds(bench: Any) -> None:
     assert (blocked != hit).any()
 
 
+@pytest.mark.parametrize("kind", ["still", "moving", "masked"])
+def test_rays_through_a_heap_of_sticks(bench: Any, kind: str) -> None:
+    """More boxes overlap than the stack of a ray holds, in the tree of triangles or, of objects that move, in theirs."""
+    random = np.random.default_rng(3)
+    lines, keys = [], []
+    for number, turn in enumerate(random.uniform(-180, 180, (96, 3)).round(1).tolist()):
+        lines.append(f"  s{number}: {{shape: box, scale: [0.03, 4, 0.03], rotate_degrees: {turn}, material: all}}")
+        keys.append(f"objects.s{number}.at: {{0: [0, 0, 0], 1: [9, 0, 0]}}")
+    text = f"materials: {{all: {{alpha_mode: {'mask' if kind == 'masked' else 'opaque'}}}}}\nobjects:\n"
+    text += "\n".join(lines) + "\n"
+    if kind == "moving":
+        text += f"keyframes: {{{', '.join(keys)}}}\n"
+    origin, aim = 3 * random.normal(size=(512, 3)), 0.3 * random.normal(size=(512, 3))
+    direction = aim - origin
+    found = trace(bench, text, origin, direction)
+    corners, names = world_triangles(load(bench.folder / "scene.yaml"))
+    rays = np.concatenate([origin, direction]).astype(np.float32).astype(np.float64).reshape(2, -1, 3)
+    expected, distance = brute_force(corners, *rays)
+    traced, hit = found["traced"], expected >= 0
+    assert 0.3 < hit.mean() < 0.95
+    assert (hit != (traced[:, 0] >= 0)).sum() <= 2
+    both = hit & (traced[:, 0] >= 0)
+    np.testing.assert_array_equal(found["more"][:, 0] > 0, traced[:, 0] >= 0)
+    assert (names[expected[both], 0] == traced[both, 0]).mean() > 0.99
+    assert (np.abs(traced[both, 2] - distance[both]) > 1e-4).sum() <= 2
+
+
 def replace_objects(scene: Scene, keep: Callable[[Object], bool]) -> Scene:
     return replace(scene, objects=tuple(placed for placed in scene.objects if keep(placed)))
 
