@@ -19,8 +19,8 @@ import rendergraph as rg
 
 SIZE, SAMPLES = (320, 180), 16
 SIDES = (8, 16, 32, 64, 128, 256, 512)
-SEGMENTS = {"cornell_box": 2.16, "courtyard": 2.56}
-"""Rays with their shadow rays that a path has on average, as counted once in the shader."""
+SEGMENTS = {"cornell_box": 2.16, "courtyard": 2.56, "Sponza": 3.56}
+"""Rays with their shadow rays that a path has on average, as counted once in the shader; Sponza as a glTF file."""
 
 
 def measure(session: rg.Session, scene: str | Path) -> tuple[float, float]:
@@ -78,11 +78,11 @@ def main() -> None:
     with rg.Session() as session, tempfile.TemporaryDirectory() as name:
         spheres = {sphere_scene(Path(name) / f"sphere_{side}.yaml", side): 2 * side**2 for side in SIDES}
         if not scenes:
-            scenes = [*SEGMENTS, *spheres]
+            scenes = ["cornell_box", "courtyard", *spheres]
         for scene in scenes:
             cpu, wall = measure(session, scene)
             text = f"{Path(scene).stem:12} {paths / cpu / 1e6:5.2f} M paths a CPU second, {paths / wall / 1e6:5.2f} a second"
-            each = SEGMENTS.get(str(scene))
+            each = SEGMENTS.get(Path(scene).stem)
             if each:
                 text += f"; {each * paths / cpu / 1e6:5.2f} and {each * paths / wall / 1e6:5.2f} M segments"
             print(text, flush=True)
