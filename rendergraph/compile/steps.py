@@ -360,7 +360,7 @@ class _Compiler(Struct, eq=False, dict=True):
         for name in sorted(TEXELS & program.uniforms.keys()):
             check_scene_includes(step, texts(), self.types)
             sampled.add(name)
-            texels, images = self.scene.texels(name), sum(use.use == "image" for use in (*step.reads, *step.writes))
+            texels, images = self.scene.texels(name), sum(use.use == "image" for _, use in touched)
             if name == TREE:  # an image, after those of the step
                 binds.append(partial(self.device.raw.glBindImageTexture, images, texels, 0, 0, 0, *_READ_RGBA32I))
             uniforms[name] = images if name == TREE else self.units.unit((texels,), 0, binds)
