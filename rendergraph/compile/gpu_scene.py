@@ -72,7 +72,7 @@ SCENE_ATTRIBUTES = {
 VERTICES, INSTANCES, TREE = "scene_vertex_texels", "scene_instance_block", "scene_tree"
 _INSTANCE_TEXELS = "scene_instance_texels"
 TEXELS = frozenset({VERTICES, _INSTANCE_TEXELS, TREE})
-"""Buffers that `scene.glsl` and `trace_tree.glsl` fetch as texels."""
+"""Buffers of which `scene.glsl` fetches texels, and which `ray_query.glsl` loads as an image."""
 _ARRAY = "scene_array_"
 """Prefix of the arrays' names in `scene.glsl`."""
 _SECTIONS = {"objects": "instances", "materials": "material_block", "lights": "light_block"}
@@ -289,10 +289,9 @@ class GpuScene(Struct, eq=False, dict=True):
 
     def texels(self, name: str) -> int:
         """Return the GL texture of a buffer that shaders fetch as texels."""
-        if name != TREE:
-            return self.data.texels[name]
-        self.tree()
-        return self._tree_texture
+        if name == TREE:
+            self.tree()
+        return self._tree_texture if name == TREE else self.data.texels[name]
 
     def tree(self) -> moderngl.Buffer:
         """The trees for `trace.glsl`, built on first use."""

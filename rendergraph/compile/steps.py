@@ -360,10 +360,10 @@ class _Compiler(Struct, eq=False, dict=True):
         for name in sorted(TEXELS & program.uniforms.keys()):
             check_scene_includes(step, texts(), self.types)
             sampled.add(name)
-            texels, images = self.scene.texels(name), sum(use.use == "image" for _, use in touched)
+            texels, unit = self.scene.texels(name), sum(use.use == "image" for _, use in touched)
             if name == TREE:  # an image, after those of the step
-                binds.append(partial(self.device.raw.glBindImageTexture, images, texels, 0, 0, 0, *_READ_RGBA32I))
-            uniforms[name] = images if name == TREE else self.units.unit((texels,), 0, binds)
+                binds.append(partial(self.device.raw.glBindImageTexture, unit, texels, 0, 0, 0, *_READ_RGBA32I))
+            uniforms[name] = unit if name == TREE else self.units.unit((texels,), 0, binds)
         cls, resources, sampled = self.types[step.node].cls, self.plan.resources, {*sampled, *materials}
         check_kept_text(step, texts, cls, resources)
         ProgramChecks(step, program, texts, cls, resources, uniforms, blocks, sampled).run()

@@ -19,7 +19,7 @@ from rendergraph.textures import FORMATS, GLSL_SHAPES, TextureDesc
 _MEMORY = r"(?:(?:coherent|volatile|restrict|readonly|writeonly|highp|mediump|lowp)\s+)*"
 _IMAGE = re.compile(
     rf"(?P<layout>layout\s*\((?P<inside>[^)]*)\)\s*)?(?P<rest>{_MEMORY}uniform\s+{_MEMORY}"
-    rf"(?P<type>[iu]?image(?!Buffer)\w+)\s+(?P<name>[A-Za-z_]\w*))"
+    rf"(?P<type>[iu]?image\w+)\s+(?P<name>[A-Za-z_]\w*))"
 )
 _OTHER_FORMATS = """rg16_snorm r16_snorm rgba8_snorm rg8_snorm r8_snorm rgba16i rgba8i rg16i rg8i r16i r8i
 rgb10_a2ui"""
@@ -43,7 +43,7 @@ def with_formats(
         if match is None:
             continue
         if match["name"] not in images:
-            if _is_compiled(source, macros, match):
+            if _is_compiled(source, macros, match) and not origins[number].shared:  # `scene_tree` is the framework's
                 place = origins[number].place(match.start("name") + 1)
                 problems.append(step.problem("RG430", _unknown(step, match, images)).relocate(place, line))
             continue

@@ -24,7 +24,6 @@ Bools: TypeAlias = npt.NDArray[np.bool_]
 
 LEAF = 4
 """Maximum number of primitives in a leaf: a reference has two bits for it."""
-_SLACK = 8  # levels that a tree may have beyond a balanced one
 _BATCH = 1 << 14  # primitives that are split together: their boxes and bins fit a core's own cache
 _BINS, _FEW_BINS = 16, 8
 _FEW = 6  # primitives per node
@@ -56,8 +55,8 @@ def leaf(first: npt.NDArray[np.int64] | int, count: npt.NDArray[np.int64] | int)
 
 
 def depth_limit(primitives: int) -> int:
-    """Return the largest depth of a tree over this many primitives, whatever their boxes; a ray's trail has 30 bits."""
-    return min(max(primitives - 1, 0).bit_length() + _SLACK, 30)
+    """Return the largest depth of a tree over this many primitives, whatever their boxes: 8 more than balanced ones."""
+    return min(max(primitives - 1, 0).bit_length() + 8, 30)  # the trail of a ray has 30 levels
 
 
 def triangle_boxes(positions: Floats, triangles: npt.NDArray[np.uint32]) -> Floats:

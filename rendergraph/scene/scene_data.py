@@ -41,7 +41,7 @@ _OPTIONAL = {"tangents": 4, "uv0": 2, "uv1": 2, "colors": 4}
 
 MOST_ARRAYS = 5
 """Maximum number of texture arrays of a scene, so that they fit into a stage's 16 units with a step's textures."""
-_WORTH = 1 << 22  # bytes that one array less may add
+_MOST_ADDED, _MOST_LAYERS = 1 << 22, 2048  # bytes, and layers that all devices have
 BORDER = 1
 """Texels of border around an image in its layer, which continue it by its wrap modes, for filtering."""
 _WRAPS = ("repeat", "mirror", "clamp")
@@ -54,9 +54,9 @@ Stored: TypeAlias = tuple[ImageSource, bool, str, str]
 class TextureArrays(NamedTuple):
     """The arrays for a scene's textures, the array and layer of each, and the number smaller than their layer.
 
-    Textures with the same format and size share an array. Arrays of the same format are merged, those first that add
-    the fewest bytes, while this adds few or there are more than `MOST_ARRAYS`: a smaller image then fills a corner of
-    its layer. Shaders sample all arrays of a slot, one after the other.
+    Textures with the same format and size share an array. Arrays of the same format are joined, those first that add
+    the fewest bytes, while a join adds at most 4 MiB or there are more than `MOST_ARRAYS`: a smaller image then fills
+    a corner of its layer. Shaders sample all arrays that hold textures of a slot, one after the other.
     """
 
     arrays: tuple[TextureDesc, ...]
@@ -92,9 +92,11 @@ def texture_arrays(descs: Mapping[Stored, TextureDesc]) -> TextureArrays:
     groups: dict[tuple[str, int, int], list[Stored]] = {}
     for key, desc in descs.items():
         groups.setdefault((desc.format, desc.width, desc.height), []).append(key)
-    while pairs := [pair for pair in combinations(groups, 2) if pair[0][0] == pair[1][0]]:
+    while pairs := [
+        (a, b) for a, b in combinations(groups, 2) if a[0] == b[0] and len(groups[a]) + len(groups[b]) <= _MOST_LAYERS
+    ]:
         one, other = min(pairs, key=lambda pair: _added_bytes(pair, groups))
-        if len(groups) <= MOST_ARRAYS and _added_bytes((one, other), groups) > _WORTH:
+        if len(groups) <= MOST_ARRAYS and _added_bytes((one, other), groups) > _MOST_ADDED:
             break
         joined = groups.pop(one) + groups.pop(other)
         groups.setdefault((one[0], max(one[1], other[1]), max(one[2], other[2])), []).extend(joined)

@@ -26,7 +26,7 @@ vec3 trace_inverse(vec3 d) {
     return 1.0 / mix(d, least, lessThan(abs(d), vec3(1e-30)));
 }
 
-// The state of a query. An invocation can have one at a time.
+// The state of a query.
 struct RayQuery {
     Hit hit;        // the nearest accepted hit, or with `any` the first; its instance is -1 if there is none
     Hit candidate;  // where the traversal has stopped
@@ -37,13 +37,13 @@ struct RayQuery {
     int rejected;   // and none of these
     int asks;
     bool any;       // the traversal ends at the first hit that is accepted
-    // State of the traversal: where it is, and the ray on the grid of the tree and in the object. `trail` has the bit of
-    // each level of the path to `node` where no child remains to be visited later.
+    // State of the traversal: where it is, and the ray on the grid of the tree and in the object. `trail` has a bit for
+    // each level of the path to `node`: it is set if the sibling at that level need not be visited any more.
     int node;
     int level;
     int trail;
     int leaf;                // below 0: triangles that wait to be tested
-    int stack[TRACE_STACK];  // the last children that remain, the last one first
+    int stack[TRACE_STACK];  // the deepest children put aside, the deepest one first
     int root;
     int after;               // the node after this tree
     int outer_level;         // of the object, in the tree over objects
@@ -60,13 +60,14 @@ struct RayQuery {
 
 // A query from `origin` along `direction` between the distances `nearest` and `farthest`, both exclusive, for surfaces
 // with all flags in `wanted` and none in `rejected`. It stops at flags of `asks`; with `any` it ends at the first hit.
+// A `nearest` below 0 counts as 0.
 RayQuery ray_query(
     vec3 origin, vec3 direction, float nearest, float farthest, int wanted, int rejected, int asks, bool any) {
     RayQuery q;
     q.hit = q.candidate = Hit(farthest, -1, -1, vec2(0.0));
     q.origin = origin;
     q.direction = direction;
-    q.nearest = nearest;
+    q.nearest = max(nearest, 0.0);
     q.wanted = wanted;
     q.rejected = rejected;
     q.asks = asks;

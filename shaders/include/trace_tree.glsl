@@ -1,10 +1,11 @@
 // Traversal of the trees over objects and triangles. `trace.glsl` has the queries for shaders to call.
 #include <trace_triangle.glsl>
 
-// Moves on from a subtree, if it `ends`: to the child that was to be visited later, the deepest one that remains. A
-// `pushed` child is kept, if the node `pushes` one.
+// If `ends`, leaves the subtree of `q.node` for the deepest child that was put aside. If `pushes`, puts the child
+// `pushed` aside.
 void trace_next(inout RayQuery q, bool ends, bool pushes, int pushed) {
-    int trail = (q.trail & -q.level) + q.level;  // sets the lowest bit that is 0, from the level on
+    // Adding 1 at the level clears levels that are finished, and sets the bit of the lowest one with a child put aside.
+    int trail = (q.trail & -q.level) + q.level;
     bool is_done = trail >= TRACE_ROOT, is_lost = q.stack[0] == TRACE_NONE;
     q.node = ends ? (is_done ? q.after : is_lost ? q.root : q.stack[0]) : q.node;
     q.trail = ends ? trail : q.trail;
@@ -16,12 +17,12 @@ void trace_next(inout RayQuery q, bool ends, bool pushes, int pushed) {
     }
 }
 
-// Visits an inner node of the tree: goes on to its nearer child that the ray hits before `reach`. Distances are compared
-// as integers, which takes a third of the operations on llvmpipe. Those below 0 are then in the wrong order, which does
-// not matter.
+// Visits an inner node of the tree: goes on to its nearer child that the ray hits before `reach`. Distances are
+// compared as integers, which takes a third of the operations on llvmpipe. Those below 0 are then in the wrong order
+// among themselves, but are less than `q.nearest` in any case.
 void trace_visit(inout RayQuery q, float reach) {
     bool is_inner = uint(q.node) < uint(TRACE_UP);
-    ivec4 low = SCENE_TREE(q.node), high = SCENE_TREE(q.node + 1);  // zeros outside of the buffer
+    ivec4 low = SCENE_TREE(q.node), high = SCENE_TREE(q.node + 1);  // used only if `is_inner`
     ivec3 a = floatBitsToInt((vec3(low.xyz & 0xFFFF) - q.grid_origin) * q.inverse);
     ivec3 b = floatBitsToInt((vec3(high.xyz & 0xFFFF) - q.grid_origin) * q.inverse);
     ivec3 c = floatBitsToInt((vec3((low.xyz >> 16) & 0xFFFF) - q.grid_origin) * q.inverse);
@@ -37,9 +38,10 @@ void trace_visit(inout RayQuery q, float reach) {
     bool right = right_enter <= min(min(leave.x, leave.y), min(leave.z, end)) + ROUNDING;
 
     bool both = left && right, right_first = right && (!left || right_enter < left_enter);
-    // After a restart, `trail` has bits below the level: the way down to the lowest one leads to what was lost.
+    // After a restart, `trail` still has bits below the level. They lead to the child that the stack has lost, which is
+    // at the lowest bit.
     int child_level = q.level >> 1, ahead = q.trail & (q.level - 1);
-    bool is_first = ahead < child_level;  // otherwise the nearer child has been visited
+    bool is_first = ahead < child_level;  // the farther child is still to be visited
     bool ends = is_inner && !both && (!(left || right) || ahead == child_level);
     bool descends = is_inner && !ends;
     int nearer = right_first ? high.w : low.w, farther = right_first ? low.w : high.w;
@@ -78,7 +80,7 @@ void trace_enter(inout RayQuery q) {
     }
 }
 
-// Whether the query has something to do in the current tree.
+// Whether the query `q` has something to do in its current tree.
 bool is_in_tree(RayQuery q) {
     return q.leaf < 0 || (q.node < TRACE_UP && (q.node >= 0 || q.in_mesh));
 }
@@ -89,9 +91,10 @@ bool is_in_tree(RayQuery q) {
 // more children remain than it holds, the traversal restarts at the root, and a bit per level says which way to take
 // (S. Laine, "Restart Trail for Stackless BVH Traversal", 2010). This needs no more than 30 levels.
 //
-// Each iteration of the inner loop tests a triangle and visits three nodes, and invocations leave it only at the end of
-// the tree. A leaf waits for the next iteration while the traversal goes on (T. Aila and S. Laine, "Understanding the
-// Efficiency of Ray Traversal on GPUs", 2009). Invocations that run in lockstep then do the same work most of the time.
+// Each iteration of the inner loop tests a triangle and visits three nodes, and invocations leave it only at candidates
+// and at the end of the tree. A leaf waits for the next iteration while the traversal goes on (T. Aila and S. Laine,
+// "Understanding the Efficiency of Ray Traversal on GPUs", 2009). Invocations that run in lockstep then do the same
+// work most of the time.
 bool find_candidate(inout RayQuery q) {
     ivec4 header = SCENE_TREE(0), header2 = SCENE_TREE(1);
     vec3 top_origin = (q.origin - intBitsToFloat(header.xyz)) * intBitsToFloat(header2.xyz);
@@ -110,8 +113,8 @@ bool find_candidate(inout RayQuery q) {
         }
         if (q.node < 0 && !q.in_mesh) trace_enter(q);
         do {
-            // This is always true, but needed: for invocations that have left a loop, llvmpipe computes all values again
-            // that are not assigned in a branch.
+            // Without this condition nothing below would act, either. But for invocations that have left the loop,
+            // llvmpipe computes all values again that are not assigned in a branch.
             if (!stops && is_in_tree(q)) {
                 bool is_leaf = q.node < 0 && q.in_mesh && q.leaf == 0;
                 q.leaf = is_leaf ? q.node : q.leaf;

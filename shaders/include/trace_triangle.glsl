@@ -6,8 +6,9 @@ vec3 trace_permuted(vec3 v, int last) {
     return last == 2 ? v : last == 0 ? v.yzx : v.zxy;
 }
 
-// Tests the next triangle of the leaf that waits; true if the query stops at it. The test is that of S. Woop, C. Benthin
-// and I. Wald ("Watertight Ray/Triangle Intersection", 2013): no ray passes between two triangles that share an edge.
+// Tests the next triangle of the leaf that waits in `q`; true if the query stops at it. `triangles_at` is the row where
+// triangles begin. The test is that of S. Woop, C. Benthin and I. Wald ("Watertight Ray/Triangle Intersection", 2013):
+// no ray passes between two triangles that share an edge.
 bool trace_triangle(inout RayQuery q, int triangles_at) {
     bool is_leaf = q.leaf < 0;
     int leaf = is_leaf ? -1 - q.leaf : 0, at = triangles_at + 3 * (leaf >> 2);

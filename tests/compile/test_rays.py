@@ -165,9 +165,11 @@ def random_rays(low: Doubles, high: Doubles, count: int = 4096, seed: int = 1) -
     return origin, direction / np.linalg.norm(direction, axis=1, keepdims=True)
 
 
-def trace(bench: Any, scene: str, origin: Doubles, direction: Doubles, **options: Any) -> dict[str, npt.NDArray[Any]]:
+def trace(
+    bench: Any, scene: str, origin: Doubles, direction: Doubles, *, nearest: float = 0, **options: Any
+) -> dict[str, npt.NDArray[Any]]:
     """Trace rays in frames of a scene given as text."""
-    RAYS["origins"] = np.concatenate([origin, np.zeros((len(origin), 1))], axis=1).astype(np.float32)
+    RAYS["origins"] = np.concatenate([origin, np.full((len(origin), 1), nearest)], axis=1).astype(np.float32)
     RAYS["directions"] = np.concatenate([direction, np.full((len(origin), 1), 1e30)], axis=1).astype(np.float32)
     text = f"nodes: {{a: {{type: given_rays, params: {{width: {len(origin) // 64}}}}}}}\n"
     text += "outputs: {traced: a.traced, more: a.more}\n"
@@ -291,6 +293,15 @@ keyframes: {objects.one.at: {0: [0, 0, 0], 1: [0, 4, 0]}}
     assert second[0, 0] == -1
     assert second[1, :1] == 0
     assert second[1, 2] == pytest.approx(8.5)
+
+
+@pytest.mark.parametrize(("nearest", "distance"), [(-10, 3.5), (0, 3.5), (3.4, 3.5), (3.6, 4.5)])
+def test_hits_are_beyond_the_least_distance(bench: Any, nearest: float, distance: float) -> None:
+    """There is a box behind the origin, too; a distance below 0 counts as 0."""
+    scene = "objects: {one: {shape: box}, behind: {shape: box, at: [0, 0, 8]}}\n"
+    origin, direction = np.tile([0.1, 0.2, 4.0], (64, 1)), np.tile([0.0, 0, -1], (64, 1))
+    found = trace(bench, scene, origin, direction, nearest=nearest)
+    np.testing.assert_allclose(found["traced"][:, 2], distance, atol=1e-5)
 
 
 def test_an_empty_scene_has_no_hit(bench: Any) -> None:
