@@ -43,7 +43,6 @@ from rendergraph.textures import FORMATS, TextureDesc
 
 _ALL_BARRIERS = 0xFFFFFFFF
 _DRAW_INDIRECT_BUFFER, _PARAMETER_BUFFER, _UNSIGNED_INT = 0x8F3F, 0x80EE, 0x1405
-_READ_RGBA32I = 0x88B8, 0x8D82
 _COMMAND_BYTES = 20  # of a draw command, with a last integer that is ignored without indices
 _TEXTURE_2D, _DEPTH_BOUNDS_TEST, _CLIP_DISTANCE0 = 0x0DE1, 0x8890, 0x3000
 
@@ -361,8 +360,10 @@ class _Compiler(Struct, eq=False, dict=True):
             check_scene_includes(step, texts(), self.types)
             sampled.add(name)
             texels, unit = self.scene.texels(name), sum(use.use == "image" for _, use in touched)
-            if name == TREE:  # an image, after those of the step
-                binds.append(partial(self.device.raw.glBindImageTexture, unit, texels, 0, 0, 0, *_READ_RGBA32I))
+            if name == TREE:  # an image, after those of the step: READ_ONLY, RGBA32I
+                binds.append(partial(self.device.raw.glBindImageTexture, unit, texels, 0, 0, 0, 0x88B8, 0x8D82))
+                if unit >= (most := self.device.limits["images"]):
+                    raise RenderError(step.problem("RG435", f"it has {unit} images and rays; this device binds {most}"))
             uniforms[name] = unit if name == TREE else self.units.unit((texels,), 0, binds)
         cls, resources, sampled = self.types[step.node].cls, self.plan.resources, {*sampled, *materials}
         check_kept_text(step, texts, cls, resources)

@@ -54,9 +54,9 @@ Stored: TypeAlias = tuple[ImageSource, bool, str, str]
 class TextureArrays(NamedTuple):
     """The arrays for a scene's textures, the array and layer of each, and the number smaller than their layer.
 
-    Textures with the same format and size share an array. Arrays of the same format are joined, those first that add
-    the fewest bytes, while a join adds at most 4 MiB or there are more than `MOST_ARRAYS`: a smaller image then fills
-    a corner of its layer. Shaders sample all arrays that hold textures of a slot, one after the other.
+    Textures with the same format and size share an array. Arrays of the same format, all of which shaders sample, are
+    joined while this adds at most 4 MiB or there are more than `MOST_ARRAYS`, those first that add the fewest bytes. A
+    smaller image fills a corner of its layer.
     """
 
     arrays: tuple[TextureDesc, ...]

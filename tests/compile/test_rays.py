@@ -361,3 +361,9 @@ def test_a_buffer_that_is_too_large_for_the_device_is_refused(bench: Any, monkey
     origin, direction = random_rays(np.zeros(3), np.ones(3), 64)
     with pytest.raises(rg.errors.RenderError, match=r"RG435 the scene's 'scene_tree' takes"):
         trace(bench, "objects: {one: {shape: sphere, segments: 16}}\n", origin, direction)
+
+
+def test_a_device_without_an_image_for_the_trees_is_refused(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(bench.session.device.limits, "images", 0)
+    with pytest.raises(rg.errors.RenderError, match=r"RG435 .*it has 0 images and rays; this device binds 0"):
+        trace(bench, MIXED, *random_rays(np.zeros(3), np.ones(3), 64))
