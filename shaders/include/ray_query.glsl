@@ -3,7 +3,7 @@
 // objects and triangles, and `rendergraph/scene/tree_data.py` describes their buffer.
 #include <scene.glsl>
 
-// An image, because llvmpipe compiles loads from images into the shader, and calls a function to fetch from samplers.
+// An image, because llvmpipe compiles loads from images in line, but calls a function for each fetch from a sampler.
 layout(rgba32i) readonly restrict uniform iimageBuffer scene_tree;
 #define SCENE_TREE(row) imageLoad(scene_tree, row)
 
