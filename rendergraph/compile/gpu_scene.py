@@ -6,6 +6,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Hashable
 from contextlib import ExitStack
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -131,7 +132,6 @@ class GpuScene(Struct, eq=False, dict=True):
     _before: moderngl.Buffer | None = None
     _data: SceneBuffers | None = None
     _tree: tuple[MeshTrees, moderngl.Buffer] | None = None
-    _tree_texture: int = 0
     _posing: Posing | None = None
     _stale_instances: set[int] = set()  # objects that have moved since the previous frame was saved
     _owned: ExitStack = field(default_factory=ExitStack)
@@ -287,12 +287,6 @@ class GpuScene(Struct, eq=False, dict=True):
         self._owned.callback(self.device.raw.delete, "glDeleteTextures", texture)
         return texture
 
-    def texels(self, name: str) -> int:
-        """Return the GL texture of a buffer that shaders fetch as texels."""
-        if name == TREE:
-            self.tree()
-        return self._tree_texture if name == TREE else self.data.texels[name]
-
     def tree(self) -> moderngl.Buffer:
         """The trees for `trace.glsl`, built on first use."""
         if self._tree is None:
@@ -300,8 +294,12 @@ class GpuScene(Struct, eq=False, dict=True):
             rows = object_rows(self.packed, self.data.instances["flags"], trees)
             _check_size(self.device, TREE, rows.nbytes + trees.rows.nbytes, texel=16)
             self._tree = trees, self._buffer(rows.tobytes() + trees.rows.tobytes())
-            self._tree_texture = self._texel_buffer(self._tree[1], "rgba32i")
         return self._tree[1]
+
+    @cached_property
+    def tree_image(self) -> int:
+        """The GL texture with which shaders load from the trees."""
+        return self._texel_buffer(self.tree(), "rgba32i")
 
     def _mesh_trees(self) -> MeshTrees:
         packed = self.packed

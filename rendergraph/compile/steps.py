@@ -43,6 +43,7 @@ from rendergraph.textures import FORMATS, TextureDesc
 
 _ALL_BARRIERS = 0xFFFFFFFF
 _DRAW_INDIRECT_BUFFER, _PARAMETER_BUFFER, _UNSIGNED_INT = 0x8F3F, 0x80EE, 0x1405
+_TREE_IMAGE = 0, 0, 0, 0x88B8, 0x8D82  # level, not layered; READ_ONLY, RGBA32I
 _COMMAND_BYTES = 20  # of a draw command, with a last integer that is ignored without indices
 _TEXTURE_2D, _DEPTH_BOUNDS_TEST, _CLIP_DISTANCE0 = 0x0DE1, 0x8890, 0x3000
 
@@ -160,6 +161,12 @@ class _Compiler(Struct, eq=False, dict=True):
             drawing = {"fullscreen": self._fullscreen, "geometry": self._geometry, "draw": self._draw}
             drawing.get(step.kind, self._compute)(step, compiled, parity)
             calls, units = image_calls(self.memory, step, parity)
+            if any(TREE in draw.program.uniforms for draw in compiled.all_draws):
+                units[TREE] = unit = max(units.values(), default=-1) + 1
+                if unit >= (most := self.device.limits["images"]):
+                    what = f"it has {unit} images, and rays take one more; this device supports {most}"
+                    raise RenderError(step.problem("RG435", what))
+                calls.append(partial(self.device.raw.glBindImageTexture, unit, self.scene.tree_image, *_TREE_IMAGE))
             compiled.before[:0] = calls  # first, because clears may bind another framebuffer
             for draw in compiled.all_draws:
                 draw.uniforms |= {name: unit for name, unit in units.items() if name in draw.program.uniforms}
@@ -359,12 +366,8 @@ class _Compiler(Struct, eq=False, dict=True):
         for name in sorted(TEXELS & program.uniforms.keys()):
             check_scene_includes(step, texts(), self.types)
             sampled.add(name)
-            texels, unit = self.scene.texels(name), sum(use.use == "image" for _, use in touched)
-            if name == TREE:  # an image, after those of the step: READ_ONLY, RGBA32I
-                binds.append(partial(self.device.raw.glBindImageTexture, unit, texels, 0, 0, 0, 0x88B8, 0x8D82))
-                if unit >= (most := self.device.limits["images"]):
-                    raise RenderError(step.problem("RG435", f"it has {unit} images and rays; this device binds {most}"))
-            uniforms[name] = unit if name == TREE else self.units.unit((texels,), 0, binds)
+            if name != TREE:  # that is an image: see `_step`
+                uniforms[name] = self.units.unit((self.scene.data.texels[name],), 0, binds)
         cls, resources, sampled = self.types[step.node].cls, self.plan.resources, {*sampled, *materials}
         check_kept_text(step, texts, cls, resources)
         ProgramChecks(step, program, texts, cls, resources, uniforms, blocks, sampled).run()

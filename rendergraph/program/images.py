@@ -43,7 +43,7 @@ def with_formats(
         if match is None:
             continue
         if match["name"] not in images:
-            if _is_compiled(source, macros, match) and not origins[number].shared:  # `scene_tree` is the framework's
+            if not origins[number].shared and _is_compiled(source, macros, match):  # `scene_tree` is shared
                 place = origins[number].place(match.start("name") + 1)
                 problems.append(step.problem("RG430", _unknown(step, match, images)).relocate(place, line))
             continue

@@ -33,8 +33,6 @@ from rendergraph.scene.bvh import LEAF, Tree, build, refit, triangle_boxes
 from rendergraph.scene.model import Floats, Matrix, Scene
 from rendergraph.scene.pack import Ints, PackedScene
 
-Rows: TypeAlias = Ints
-
 _CELLS = 65533  # cells of a grid, with room for rounding
 _MARGIN = 0.02  # cells by which boxes are enlarged, for the rounding of rays
 _HEADER, _OBJECT, _NODE, _TRIANGLE = 2, 5, 2, 3  # rows
@@ -60,7 +58,7 @@ class MeshTrees(Struct, frozen=True, eq=False):
         tree: the shared tree.
     """
 
-    rows: Rows
+    rows: Ints
     grids: Floats
     roots: Ints
     triangles_at: int
@@ -173,7 +171,7 @@ def _in_world(packed: PackedScene, shapes: list[_Shape], objects: npt.NDArray[np
     return np.concatenate(positions), np.concatenate(triangles)
 
 
-def object_rows(packed: PackedScene, flags: Ints, trees: MeshTrees) -> Rows:
+def object_rows(packed: PackedScene, flags: Ints, trees: MeshTrees) -> Ints:
     """Return the rows before those of meshes, with a tree over the objects at their current positions.
 
     `flags` (n,) are those of each object's `SceneInstance`.
@@ -223,7 +221,7 @@ def _grid(boxes: Floats) -> Floats:
     return np.stack([np.nextafter(low.astype(np.float32), np.float32(-np.inf)), (_CELLS / extent).astype(np.float32)])
 
 
-def _node_rows(boxes: Floats, children: Ints, grid: Floats) -> Rows:
+def _node_rows(boxes: Floats, children: Ints, grid: Floats) -> Ints:
     """Return rows of nodes with their boxes (n, 2, 6), rounded outwards, and references (n, 2)."""
     low, scale = grid.astype(np.float64)
     rows = np.zeros((len(boxes), _NODE, 4), np.uint32)

@@ -11,8 +11,8 @@ bool trace_is_cut_away(Hit hit) {
 }
 #endif
 
-// The nearest surface along a ray between two distances in lengths of the direction. It finds transparent surfaces,
-// too, but neither parts that an alpha mask cuts away nor hidden objects.
+// The nearest surface along a ray between two distances, at least 0, in lengths of the direction. It finds transparent
+// surfaces, too, but neither parts that an alpha mask cuts away nor hidden objects.
 bool nearest_hit(vec3 origin, vec3 direction, float nearest, float farthest, out Hit hit) {
 #ifdef SCENE_ANY_MASKED
     RayQuery query = ray_query(origin, direction, nearest, farthest, 0, 0, SCENE_MASKED, false);

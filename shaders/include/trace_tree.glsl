@@ -81,7 +81,7 @@ void trace_enter(inout RayQuery q) {
 }
 
 // Whether the query `q` has something to do in its current tree.
-bool is_in_tree(RayQuery q) {
+bool trace_has_work(RayQuery q) {
     return q.leaf < 0 || (q.node < TRACE_UP && (q.node >= 0 || q.in_mesh));
 }
 
@@ -115,7 +115,7 @@ bool find_candidate(inout RayQuery q) {
         do {
             // Without this condition nothing below would act, either. But for invocations that have left the loop,
             // llvmpipe computes all values again that are not assigned in a branch.
-            if (!stops && is_in_tree(q)) {
+            if (!stops && trace_has_work(q)) {
                 bool is_leaf = q.node < 0 && q.in_mesh && q.leaf == 0;
                 q.leaf = is_leaf ? q.node : q.leaf;
                 trace_next(q, is_leaf, false, 0);
@@ -123,7 +123,7 @@ bool find_candidate(inout RayQuery q) {
                 stops = trace_triangle(q, header2.w);
                 for (int i = 0; i < 3; ++i) trace_visit(q, reach);
             }
-        } while (!stops && is_in_tree(q));
+        } while (!stops && trace_has_work(q));
     } while (!stops && q.node != TRACE_END);
     return stops;
 }

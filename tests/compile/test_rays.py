@@ -158,6 +158,17 @@ def brute_force(corners: Doubles, origin: Doubles, direction: Doubles) -> tuple[
     return found, best
 
 
+def searched(bench: Any, *rays: Doubles) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], Doubles]:
+    """Names of all triangles of the scene that was drawn last, the nearest one along each ray, and its distance."""
+    corners, names = world_triangles(load(bench.folder / "scene.yaml"))
+    return names, *brute_force(corners, *rounded(*rays))
+
+
+def rounded(*rays: Doubles) -> Doubles:
+    """Origins and directions as shaders get them."""
+    return np.stack(rays).astype(np.float32).astype(np.float64)
+
+
 def random_rays(low: Doubles, high: Doubles, count: int = 4096, seed: int = 1) -> tuple[Doubles, Doubles]:
     random = np.random.default_rng(seed)
     origin = low + (high - low) * random.random((count, 3))
@@ -198,10 +209,7 @@ def test_rays_find_what_a_search_over_all_triangles_finds(bench: Any) -> None:
     """With mirrored and stretched objects, one scaled to a plane, one to a point and a hidden one."""
     origin, direction = random_rays(np.array([-4.0, 0.1, -3]), np.array([4.0, 4, 4]), 512)
     found = trace(bench, MIXED, origin, direction)
-    scene = load(bench.folder / "scene.yaml")
-    corners, names = world_triangles(scene)
-    rays = np.concatenate([origin, direction]).astype(np.float32).astype(np.float64).reshape(2, -1, 3)
-    expected, distance = brute_force(corners, *rays)
+    names, expected, distance = searched(bench, origin, direction)
     traced, hit = found["traced"], expected >= 0
     assert 0.5 < hit.mean() < 0.999
     assert (hit != (traced[:, 0] >= 0)).sum() <= 2  # a ray may pass the edge of an object on either side
@@ -215,15 +223,16 @@ def test_rays_find_what_a_search_over_all_triangles_finds(bench: Any) -> None:
     assert set(np.unique(traced[both][:, 0])) >= {0, 1, 2, 3, 4}
     assert 5 not in traced[:, 0]
     np.testing.assert_array_equal(found["more"][:, 0] > 0, traced[:, 0] >= 0)
+    scene = load(bench.folder / "scene.yaml")
     casting, _ = world_triangles(replace_objects(scene, lambda placed: placed.casts_shadow))
-    blocked = brute_force(casting, *rays)[0] >= 0
+    blocked = brute_force(casting, *rounded(origin, direction))[0] >= 0
     assert ((found["more"][:, 1] > 0) != blocked).sum() <= 2
     assert (blocked != hit).any()
 
 
 @pytest.mark.parametrize("kind", ["still", "moving", "masked"])
 def test_rays_through_a_heap_of_sticks(bench: Any, kind: str) -> None:
-    """More boxes overlap than the stack of a ray holds, in the tree of triangles or, of objects that move, in theirs."""
+    """More boxes overlap than the stack of a ray holds, in the shared tree or in the tree over moving objects."""
     random = np.random.default_rng(3)
     lines, keys = [], []
     for number, turn in enumerate(random.uniform(-180, 180, (96, 3)).round(1).tolist()):
@@ -236,9 +245,7 @@ def test_rays_through_a_heap_of_sticks(bench: Any, kind: str) -> None:
     origin, aim = 3 * random.normal(size=(512, 3)), 0.3 * random.normal(size=(512, 3))
     direction = aim - origin
     found = trace(bench, text, origin, direction)
-    corners, names = world_triangles(load(bench.folder / "scene.yaml"))
-    rays = np.concatenate([origin, direction]).astype(np.float32).astype(np.float64).reshape(2, -1, 3)
-    expected, distance = brute_force(corners, *rays)
+    names, expected, distance = searched(bench, origin, direction)
     traced, hit = found["traced"], expected >= 0
     assert 0.3 < hit.mean() < 0.95
     assert (hit != (traced[:, 0] >= 0)).sum() <= 2
@@ -365,5 +372,7 @@ def test_a_buffer_that_is_too_large_for_the_device_is_refused(bench: Any, monkey
 
 def test_a_device_without_an_image_for_the_trees_is_refused(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(bench.session.device.limits, "images", 0)
-    with pytest.raises(rg.errors.RenderError, match=r"RG435 .*it has 0 images and rays; this device binds 0"):
+    with pytest.raises(
+        rg.errors.RenderError, match=r"RG435 .*it has 0 images, and rays take one more; this device supports 0"
+    ):
         trace(bench, MIXED, *random_rays(np.zeros(3), np.ones(3), 64))

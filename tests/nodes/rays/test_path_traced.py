@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import OpenImageIO as oiio
 import pytest
+from msgspec.structs import replace
 
 import rendergraph as rg
 
@@ -597,3 +598,21 @@ def test_shadow_rays_meet_all_panes_and_what_is_behind_them(session: rg.Session,
         pipeline = rg.load("path-traced", scene=tmp_path / "panes.yaml", camera=camera, size=(4, 4), sets=settings)
         found.append(float(np.asarray(session.render(pipeline, outputs=["radiance"])["radiance"])[..., 0].mean()))
     np.testing.assert_allclose(found, np.array([0.5, 0.25, 0]) * 3 / np.pi, rtol=1e-4, atol=1e-6)
+
+
+def test_the_near_plane_of_an_orthographic_camera_may_be_behind_it(session: rg.Session) -> None:
+    pipeline = rg.load("path-traced", scene="shapes", size=(32, 24), sets=("light.samples=4", "light.max_bounces=0"))
+    with session.current():
+        drawing = session.compile(pipeline, outputs=["radiance"])
+        camera = replace(drawing.expanded.linked.scene.cameras["main"], type="orthographic", height=5.0)
+
+        def seen(forward: float) -> Image:
+            transform = camera.transform.copy()
+            transform[:3, 3] -= forward * transform[:3, 2]
+            drawing.begin()
+            drawing.draw(1, replace(camera, transform=transform, near=0.05 - forward, far=50 - forward))
+            return np.asarray(drawing.read()["radiance"][..., :3], np.float64)
+
+        before_it, behind_it = seen(0.0), seen(6.0)
+    assert before_it.std() > 0.05
+    assert (np.abs(before_it - behind_it).max(axis=-1) > 1e-4).mean() < 0.01
